@@ -1,0 +1,4 @@
+//! `trackfuse`
+#![forbid(unsafe_code)]
+
+pub mod time;

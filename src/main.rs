@@ -1,0 +1,2 @@
+//! The `trackfuse` program.
+fn main() {}
