@@ -1,4 +1,8 @@
 //! `trackfuse`
 #![forbid(unsafe_code)]
 
+pub mod estimate;
+pub mod math;
+pub mod sample;
 pub mod time;
+pub mod track;

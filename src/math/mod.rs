@@ -1,0 +1,8 @@
+//! Mathematics that knows no sea: numbers in, numbers out.
+
+pub mod banded;
+pub mod chebyshev;
+pub mod gaussian_basis;
+pub mod least_squares;
+pub mod robust;
+pub mod scalar;

@@ -1,0 +1,100 @@
+//! The one thing that every estimator makes: a track.
+
+use crate::time::Time;
+
+/// A curve's state at one instant, as an estimator knows it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct State {
+    /// Position, m.
+    pub position: [f64; 3],
+    /// Velocity, m/s.
+    pub velocity: [f64; 3],
+    /// Acceleration, m/s2, where the method has one of its own.
+    pub acceleration: Option<[f64; 3]>,
+    /// Standard deviation of the position, m.
+    pub position_sigma: [f64; 3],
+    /// Standard deviation of the velocity, m/s.
+    pub velocity_sigma: [f64; 3],
+}
+
+/// A fitted curve that can be asked for its state.
+pub trait Curve {
+    /// The state at `time_s` seconds since the track's origin, or `None` where the method doesn't reach.
+    fn at(&self, time_s: f64) -> Option<State>;
+}
+
+/// What sees an instant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Phase {
+    /// One source.
+    Single,
+    /// Two or more.
+    Overlap,
+    /// None, but sources stand before and after.
+    Bridged,
+    /// None, and none comes after.
+    Extrapolated,
+}
+
+impl Phase {
+    /// The phase's name in logs and reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Single => "single",
+            Self::Overlap => "overlap",
+            Self::Bridged => "bridged",
+            Self::Extrapolated => "extrapolated",
+        }
+    }
+}
+
+/// How a point was made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Method {
+    /// General data fusion, the weighted mean.
+    WeightedMean,
+    /// Polynomial constraint fusion.
+    Polynomial,
+    /// Spline function fusion.
+    Spline,
+    /// Moving average over the weighted mean.
+    MovingAverage,
+}
+
+impl Method {
+    /// The method's name in configs, logs and reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::WeightedMean => "gdf",
+            Self::Polynomial => "pcf",
+            Self::Spline => "sff",
+            Self::MovingAverage => "moving-average",
+        }
+    }
+}
+
+/// The track at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrackPoint {
+    /// The instant, on the datum's clock.
+    pub time: Time,
+    /// What the curve says.
+    pub state: State,
+    /// What sees this instant.
+    pub phase: Phase,
+    /// How the point was made.
+    pub method: Method,
+    /// The sources that see this instant: bit i is the i-th.
+    pub seen_by: u32,
+}
+
+/// A track: points in order of time in one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Track {
+    /// The frame that the coordinates are in; empty where the log doesn't say.
+    pub frame_id: String,
+    /// The points.
+    pub points: Vec<TrackPoint>,
+}
