@@ -17,6 +17,21 @@ pub struct State {
     pub velocity_sigma: [f64; 3],
 }
 
+impl State {
+    /// The state at `share` of the way from this one to `other`, by linear interpolation.
+    #[must_use]
+    pub fn mixed(&self, other: &Self, share: f64) -> Self {
+        let mix = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|i| a[i] + share * (b[i] - a[i]));
+        Self {
+            position: mix(self.position, other.position),
+            velocity: mix(self.velocity, other.velocity),
+            acceleration: self.acceleration.zip(other.acceleration).map(|(a, b)| mix(a, b)),
+            position_sigma: mix(self.position_sigma, other.position_sigma),
+            velocity_sigma: mix(self.velocity_sigma, other.velocity_sigma),
+        }
+    }
+}
+
 /// A fitted curve that can be asked for its state.
 pub trait Curve {
     /// The state at `time_s` seconds since the track's origin, or `None` where the method doesn't reach.

@@ -1,6 +1,10 @@
 //! The estimators: one file a method, beside its paper. Numbers in, curves out; no files, clocks or prints.
 
+pub mod coverage;
+pub mod moving_average;
+pub mod polynomial;
 pub mod spline;
+pub mod weighted_mean;
 
 /// Why an estimator has no answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
