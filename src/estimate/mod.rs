@@ -1,7 +1,11 @@
 //! The estimators: one file a method, beside its paper. Numbers in, curves out; no files, clocks or prints.
 
+pub mod agreement;
+pub mod characteristic_point;
 pub mod coverage;
+pub mod extrapolation;
 pub mod moving_average;
+pub mod noise;
 pub mod polynomial;
 pub mod spline;
 pub mod weighted_mean;

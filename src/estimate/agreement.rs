@@ -1,0 +1,172 @@
+//! Do two sources agree where both see?
+//!
+//! Their differences at common instants are noise if they do. A median difference that stands out of that
+//! noise is a systematic error of one or both, which plain fusion (GDF, PCF, SFF alike) carries straight
+//! into the track. Only the difference is seen, never which of them is wrong.
+
+use super::coverage::{Coverage, interpolate};
+use crate::math::robust;
+use crate::sample::{Quantity, Sample, Source};
+
+/// Differences are called systematic from this many standard deviations on: with three axes and two
+/// quantities, once in 2,600 pairs of honest sources.
+const SIGNIFICANT_SIGMAS: f64 = 4.0;
+
+/// Fewest differences that say anything.
+const MIN_DIFFERENCES: usize = 5;
+
+/// How two sources differ in one quantity where both see.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Disagreement {
+    /// Indices of the sources; the difference is second less first.
+    pub sources: (usize, usize),
+    /// What they differ in.
+    pub quantity: Quantity,
+    /// Median difference by axis, m or m/s.
+    pub median: [f64; 3],
+    /// Standard deviation of that median by axis.
+    pub sigma: [f64; 3],
+    /// Number of instants compared.
+    pub count: usize,
+}
+
+impl Disagreement {
+    /// Whether an axis' median stands out of its noise.
+    #[must_use]
+    pub fn is_significant(&self) -> bool {
+        self.median.iter().zip(self.sigma).any(|(m, s)| m.abs() > SIGNIFICANT_SIGMAS * s)
+    }
+
+    /// The length of the difference over the three axes, m or m/s.
+    #[must_use]
+    pub fn length(&self) -> f64 {
+        self.median.iter().map(|m| m * m).sum::<f64>().sqrt()
+    }
+}
+
+/// Compares every two sources in every quantity that both measure in their overlap.
+#[must_use]
+pub fn compare(sources: &[Source]) -> Vec<Disagreement> {
+    let coverage = Coverage::of(sources);
+    let mut found = Vec::new();
+    for second in 0..sources.len() {
+        for first in 0..second {
+            for quantity in Quantity::ALL {
+                let (a, b) = (sources[first].series(quantity), sources[second].series(quantity));
+                // the denser one is interpolated
+                let differences = if a.len() >= b.len() {
+                    differences(b, a, coverage.outage_s(first), 1.0)
+                } else {
+                    differences(a, b, coverage.outage_s(second), -1.0)
+                };
+                found.extend(summarise(&differences, (first, second), quantity));
+            }
+        }
+    }
+    found
+}
+
+/// `sign` times (sample less the other series) at every sample's instant: value and expected sigma.
+fn differences(samples: &[Sample], other: &[Sample], max_gap_s: f64, sign: f64) -> Vec<([f64; 3], [f64; 3])> {
+    let difference = |s: &Sample| {
+        let there = interpolate(other, s.time_s, max_gap_s)?;
+        let value = std::array::from_fn(|i| sign * (s.value[i] - there.value[i]));
+        Some((value, std::array::from_fn(|i| s.sigma[i].hypot(there.sigma[i]))))
+    };
+    samples.iter().filter_map(difference).collect()
+}
+
+fn summarise(
+    differences: &[([f64; 3], [f64; 3])],
+    sources: (usize, usize),
+    quantity: Quantity,
+) -> Option<Disagreement> {
+    let count = differences.len();
+    if count < MIN_DIFFERENCES {
+        return None;
+    }
+    let (mut medians, mut sigmas) = ([0.0; 3], [0.0; 3]);
+    for axis in 0..3 {
+        let mut values: Vec<f64> = differences.iter().map(|d| d.0[axis]).collect();
+        let deviations = |m: f64| differences.iter().map(move |d| d.0[axis] - m);
+        let median = robust::median(&mut values)?;
+        let spread = robust::sigma_about_zero(&mut deviations(median).collect::<Vec<_>>())?;
+        let stated = robust::median(&mut differences.iter().map(|d| d.1[axis]).collect::<Vec<_>>())?;
+        // neighbours that deviate alike count for fewer: n (1 - r) / (1 + r)
+        let clipped: Vec<f64> = deviations(median).map(|d| d.clamp(-3.0 * spread, 3.0 * spread)).collect();
+        let correlation = lag_one_correlation(&clipped).clamp(0.0, 0.95);
+        let effective = (count as f64 * (1.0 - correlation) / (1.0 + correlation)).max(1.0);
+        medians[axis] = median;
+        sigmas[axis] = 1.2533 * spread.max(stated) / effective.sqrt(); // a median's, of normal noise
+    }
+    Some(Disagreement { sources, quantity, median: medians, sigma: sigmas, count })
+}
+
+/// Correlation of successive numbers of zero mean; 0 of fewer than two.
+fn lag_one_correlation(values: &[f64]) -> f64 {
+    let squares: f64 = values.iter().map(|v| v * v).sum();
+    let products: f64 = values.windows(2).map(|w| w[0] * w[1]).sum();
+    if squares > 0.0 { products / squares } else { 0.0 }
+}
+
+/// By axis, the systematic part of the largest significant difference in `quantity`, its own noise taken
+/// off; 0 where all agree. What a track's band must be widened by until the sources are registered.
+#[must_use]
+pub fn systematic_sigma(disagreements: &[Disagreement], quantity: Quantity) -> [f64; 3] {
+    let mut widest = [0.0_f64; 3];
+    for d in disagreements.iter().filter(|d| d.quantity == quantity && d.is_significant()) {
+        for axis in 0..3 {
+            let excess = d.median[axis].powi(2) - d.sigma[axis].powi(2);
+            widest[axis] = widest[axis].max(excess.max(0.0).sqrt());
+        }
+    }
+    widest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    fn source(seed: u64, bias: f64, from: f64, step: f64) -> Source {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let positions = (0..100)
+            .map(|i| {
+                let time_s = from + step * f64::from(i);
+                let value = std::array::from_fn(|_| {
+                    let noise: f64 = StandardNormal.sample(&mut rng);
+                    time_s + 0.1 * noise + bias
+                });
+                Sample { time_s, value, sigma: [0.1; 3] }
+            })
+            .collect();
+        Source { name: "test".into(), positions, velocities: Vec::new() }
+    }
+
+    #[test]
+    fn honest_sources_agree_in_all_of_a_hundred_pairs() {
+        for seed in 0..100 {
+            let found = compare(&[source(seed, 0.0, 0.0, 0.02), source(seed + 1000, 0.0, 1.0, 0.05)]);
+            assert_eq!(found.len(), 1);
+            assert!(!found[0].is_significant(), "{found:?}");
+            assert_eq!(systematic_sigma(&found, Quantity::Position), [0.0; 3]);
+        }
+    }
+
+    #[test]
+    fn a_bias_of_one_sigma_is_found_with_its_sign() {
+        for (first, second, sign) in [(0.0, 0.15, 1.0), (0.15, 0.0, -1.0)] {
+            let found = compare(&[source(1, first, 0.0, 0.02), source(2, second, 0.5, 0.02)]);
+            assert!(found[0].is_significant());
+            assert!((found[0].median[1] - sign * 0.15).abs() < 0.05, "{found:?}");
+            assert!(systematic_sigma(&found, Quantity::Position)[1] > 0.1);
+        }
+    }
+
+    #[test]
+    fn sources_that_never_meet_are_not_compared() {
+        assert!(compare(&[source(1, 0.0, 0.0, 0.02), source(2, 9.0, 5.0, 0.02)]).is_empty());
+    }
+}

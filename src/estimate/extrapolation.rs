@@ -1,0 +1,211 @@
+//! The track beyond the last sample: a polynomial fitted to the last stretch, carried on.
+//!
+//! Zhang 2025 fits an order-4 PCF to the last 46 samples and carries it 100 samples on. Plain least squares
+//! does that for a moment only: the errors of its jerk and snap grow with t^3 and t^4. With a [`Prior`]
+//! that keeps both small it holds several times longer.
+//!
+//! The band. What a polynomial gets wrong is the future acceleration. Take that as white noise of density q
+//! (m^2/s^3) from the last sample on: the velocity's variance grows by q h, the position's by q h^3 / 3 at a
+//! lead h, beside the fit's own. q is found by maximum likelihood from *rolling origins*: the same
+//! extrapolation from six earlier instants, held against the curve that the later samples gave.
+
+use super::EstimateError;
+use super::polynomial::{self, Polynomial, Prior};
+use super::spline::Coefficients;
+use crate::math::scalar;
+use crate::sample::Source;
+use crate::track::{Curve, State};
+
+/// What may be chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Order of the polynomial.
+    pub order: usize,
+    /// Length of the stretch that it is fitted to, s.
+    pub window_s: f64,
+    /// The constraint on jerk and snap; `None` for the paper's plain least squares.
+    pub prior: Option<Prior>,
+    /// How far to go, s.
+    pub horizon_s: f64,
+}
+
+/// Earlier instants that the same extrapolation is tried from.
+const ORIGINS: usize = 6;
+
+/// Leads at which each trial is held against the curve.
+const LEADS: usize = 4;
+
+/// A polynomial carried on, with a band that grows.
+#[derive(Clone, Debug)]
+pub struct Extrapolation {
+    polynomial: Polynomial,
+    /// The last sample's time, s.
+    pub from_s: f64,
+    /// Density of the acceleration's error by axis, m^2/s^3.
+    pub acceleration_density: [f64; 3],
+    /// Root mean square 3-D position error of the trials, m, and their mean lead, s.
+    pub holdout: Holdout,
+}
+
+/// How the trials from earlier instants did.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Holdout {
+    /// Root mean square 3-D position error at the farthest lead of each trial, m.
+    pub position_m: f64,
+    /// Root mean square 3-D velocity error there, m/s.
+    pub velocity_m_s: f64,
+    /// The mean of those leads, s.
+    pub lead_s: f64,
+    /// Number of trials.
+    pub trials: usize,
+}
+
+/// One error of a trial: lead, fit's variance, squared error, by axis and for position and velocity.
+struct Miss {
+    lead_s: f64,
+    origin: usize,
+    made: State,
+    truth: State,
+}
+
+/// Fits the last `window_s` before `to_s` and judges it on the stretch of `curve` before that.
+///
+/// # Errors
+/// Those of the polynomial's fit; [`EstimateError::TooFewSamples`] where the curve, which begins at
+/// `from_s`, is too short for a single trial, so that nobody could say how far off the result is.
+pub fn extrapolate(
+    sources: &[Source],
+    curve: &dyn Curve,
+    from_s: f64,
+    to_s: f64,
+    settings: &Settings,
+) -> Result<Extrapolation, EstimateError> {
+    let fit = |end_s: f64| {
+        let (order, prior) = (settings.order, settings.prior);
+        polynomial::fit(sources, end_s - settings.window_s, end_s, order, Coefficients::Shared, prior)
+    };
+    let polynomial = fit(to_s)?;
+    let reach = settings.horizon_s.min(settings.window_s).min(0.5 * (to_s - from_s));
+    let mut misses = Vec::new();
+    for origin in 1..=ORIGINS {
+        let origin_s = to_s - reach * origin as f64 / ORIGINS as f64;
+        if let Ok(trial) = fit(origin_s) {
+            for lead in 1..=LEADS {
+                let lead_s = (to_s - origin_s) * lead as f64 / LEADS as f64;
+                let time_s = (origin_s + lead_s).min(to_s);
+                let pair = trial.at(time_s).zip(curve.at(time_s));
+                misses.extend(pair.map(|(made, truth)| Miss { lead_s, origin, made, truth }));
+            }
+        }
+    }
+    if misses.is_empty() {
+        return Err(EstimateError::TooFewSamples { what: "extrapolation's trials".into(), needed: 1, got: 0 });
+    }
+    let acceleration_density = std::array::from_fn(|axis| density(&misses, axis));
+    Ok(Extrapolation { polynomial, from_s: to_s, acceleration_density, holdout: holdout(&misses) })
+}
+
+/// The density q of greatest likelihood on one axis, m^2/s^3.
+fn density(misses: &[Miss], axis: usize) -> f64 {
+    let cost = |exponent: f64| {
+        let q = 10.0_f64.powf(exponent);
+        let term = |error: f64, variance: f64| variance.ln() + error * error / variance;
+        misses
+            .iter()
+            .map(|m| {
+                let h = m.lead_s;
+                let variance = |a: f64, b: f64, growth: f64| (a * a + b * b + q * growth).max(1e-30);
+                let p = variance(m.made.position_sigma[axis], m.truth.position_sigma[axis], h.powi(3) / 3.0);
+                let v = variance(m.made.velocity_sigma[axis], m.truth.velocity_sigma[axis], h);
+                term(m.made.position[axis] - m.truth.position[axis], p)
+                    + term(m.made.velocity[axis] - m.truth.velocity[axis], v)
+            })
+            .sum()
+    };
+    10.0_f64.powf(scalar::minimise(-8.0, 6.0, 28, 0.01, cost).x)
+}
+
+fn holdout(misses: &[Miss]) -> Holdout {
+    let farthest: Vec<&Miss> = misses.chunk_by(|a, b| a.origin == b.origin).filter_map(<[_]>::last).collect();
+    let mean = |f: &dyn Fn(&Miss) -> f64| {
+        farthest.iter().map(|m| f(m)).sum::<f64>() / farthest.len() as f64
+    };
+    let square = |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>();
+    Holdout {
+        position_m: mean(&|m| square(m.made.position, m.truth.position)).sqrt(),
+        velocity_m_s: mean(&|m| square(m.made.velocity, m.truth.velocity)).sqrt(),
+        lead_s: mean(&|m| m.lead_s),
+        trials: farthest.len(),
+    }
+}
+
+impl Curve for Extrapolation {
+    fn at(&self, time_s: f64) -> Option<State> {
+        let lead = time_s - self.from_s;
+        let mut state = self.polynomial.at(time_s).filter(|_| lead >= 0.0)?;
+        for (axis, q) in self.acceleration_density.into_iter().enumerate() {
+            state.position_sigma[axis] = state.position_sigma[axis].hypot((q * lead.powi(3) / 3.0).sqrt());
+            state.velocity_sigma[axis] = state.velocity_sigma[axis].hypot((q * lead).sqrt());
+        }
+        Some(state)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimate::weighted_mean::WeightedMean;
+    use crate::sample::Sample;
+
+    fn source(seconds: f64, z: impl Fn(f64) -> (f64, f64)) -> Source {
+        let n = (seconds / 0.02).round() as i32;
+        let series = |f: &dyn Fn(f64) -> f64| {
+            (0..=n)
+                .map(|i| 0.02 * f64::from(i))
+                .map(|t| Sample { time_s: t, value: [f(t); 3], sigma: [0.01; 3] })
+                .collect()
+        };
+        Source {
+            name: "test".into(),
+            positions: series(&|t| z(t).0),
+            velocities: series(&|t| z(t).1),
+        }
+    }
+
+    const SETTINGS: Settings =
+        Settings { order: 4, window_s: 1.4, prior: Some(Prior { sigma: 0.5 }), horizon_s: 2.0 };
+
+    fn run(source: Source, settings: &Settings) -> Result<Extrapolation, EstimateError> {
+        let end = source.span_s().map_or(0.0, |s| s.1);
+        let sources = vec![source];
+        let curve = WeightedMean::new(sources.clone());
+        extrapolate(&sources, &curve, 0.0, end, settings)
+    }
+
+    #[test]
+    fn uniform_acceleration_is_carried_on_with_a_narrow_band() {
+        let found = run(source(4.0, |t| (0.5 * t * t, t)), &SETTINGS).expect("long enough");
+        let state = found.at(6.0).expect("beyond the end");
+        assert!((state.position[0] - 18.0).abs() < 1e-3 && (state.velocity[0] - 6.0).abs() < 1e-3);
+        assert!(state.position_sigma[0] < 0.2, "{}", state.position_sigma[0]);
+        assert!(found.at(3.9).is_none());
+    }
+
+    #[test]
+    fn a_motion_that_polynomials_follow_badly_gets_a_band_that_says_so() {
+        let wave = |t: f64| (2.0 * (3.0 * t).sin(), 6.0 * (3.0 * t).cos());
+        let found = run(source(6.0, wave), &SETTINGS).expect("long enough");
+        for lead in [0.3, 1.0, 2.0] {
+            let state = found.at(6.0 + lead).expect("beyond the end");
+            let error = (state.position[0] - wave(6.0 + lead).0).abs();
+            assert!(error < 2.5 * state.position_sigma[0], "{lead}: {error} {}", state.position_sigma[0]);
+        }
+        assert_eq!(found.holdout.trials, ORIGINS);
+        assert!(found.holdout.position_m > 0.05, "{:?}", found.holdout);
+    }
+
+    #[test]
+    fn a_track_too_short_to_judge_is_not_extrapolated() {
+        assert!(run(source(0.1, |t| (t, 1.0)), &Settings { order: 12, ..SETTINGS }).is_err());
+    }
+}
