@@ -1,7 +1,9 @@
 //! `trackfuse`
 #![forbid(unsafe_code)]
 
+pub mod config;
 pub mod estimate;
+pub mod fusion;
 pub mod math;
 pub mod sample;
 pub mod time;

@@ -1,0 +1,484 @@
+//! What the user asked for: the TOML config, every key with a default that suits a normal log.
+//!
+//! Sigmas, times and lengths carry their unit in the key. The resolved values go into the output's
+//! metadata, so that a track can be made again.
+
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Why a config can't be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// The file can't be read.
+    #[error("config {path}: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The text is not a config.
+    #[error("config {path}: {message}")]
+    Syntax {
+        /// The file.
+        path: PathBuf,
+        /// Line, key, and what was expected there.
+        message: String,
+        /// The nearest key that exists, where one is near.
+        nearest: Option<String>,
+    },
+    /// A value is out of its range.
+    #[error("config: {key} is {value}, expected {expected}")]
+    Range {
+        /// The key.
+        key: String,
+        /// Its value.
+        value: String,
+        /// What it should be.
+        expected: &'static str,
+    },
+}
+
+impl ConfigError {
+    /// What to do about it.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        match self {
+            Self::Syntax { nearest: Some(key), .. } => Some(format!("did you mean `{key}`?")),
+            _ => None,
+        }
+    }
+}
+
+/// A config: what to fuse, how, and where the result goes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// The output.
+    pub output: Output,
+    /// The sources; without any, they are recognised by their topics' names.
+    pub source: Vec<SourceConfig>,
+    /// How they are fused.
+    pub fusion: Fusion,
+    /// How the track is carried on.
+    pub extrapolation: Extrapolation,
+    /// Heights whose first upward crossing is reported.
+    pub characteristic_point: Vec<CharacteristicPoint>,
+}
+
+/// The output.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Output {
+    /// Prefix of the new topics.
+    pub prefix: String,
+    /// Points of the track a second; default: the fastest source's rate.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rate_hz: Option<f64>,
+    /// Frame of the track; default: the datum's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frame_id: Option<String>,
+    /// Compression of the new chunks.
+    pub compression: Compression,
+    /// T0, from which times count, ns; default: the datum's first sample.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub t0_ns: Option<i64>,
+    /// Whether z = 0 is the sea surface, so that points carry a depth; default: when every observed position
+    /// lies below z = 2 m and some below -2 m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub surface_at_zero: Option<bool>,
+}
+
+impl Default for Output {
+    fn default() -> Self {
+        Self {
+            prefix: "/fused".into(),
+            rate_hz: None,
+            frame_id: None,
+            compression: Compression::Zstd,
+            t0_ns: None,
+            surface_at_zero: None,
+        }
+    }
+}
+
+/// Compression of the new chunks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Compression {
+    /// Zstandard.
+    #[default]
+    Zstd,
+    /// LZ4.
+    Lz4,
+    /// None.
+    None,
+}
+
+/// One sensor.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct SourceConfig {
+    /// What to call it.
+    pub name: String,
+    /// Message path of its position, m: an object with x, y, z or an array of three.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position: Option<String>,
+    /// Message path of its velocity, m/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<String>,
+    /// Whether its bias and clock are zero by definition; default: the tether's are, else the first source's.
+    pub datum: bool,
+    /// Its axes.
+    pub axes: Axes,
+    /// Standard deviation of its position, m; default: from the messages, else estimated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_sigma_m: Option<f64>,
+    /// Standard deviation of its velocity, m/s; default: from the messages, else estimated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub velocity_sigma_m_s: Option<f64>,
+    /// What counts as a sample's time; default: its stamp, else the publish time, else the log time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time: Option<TimeChoice>,
+    /// How long before its time a sample was taken, s.
+    pub latency_s: f64,
+    /// Added to every position, m: the vector, in the track's frame, from what is measured to what is tracked.
+    pub offset_m: [f64; 3],
+    /// Frame of its velocities; default: `body` for `nav_msgs/Odometry`, else `world`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub velocity_frame: Option<VelocityFrame>,
+}
+
+/// Directions of x, y and z.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Axes {
+    /// East, north, up.
+    #[default]
+    Enu,
+    /// North, east, down.
+    Ned,
+}
+
+/// What counts as a sample's time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum TimeChoice {
+    /// The stamp in the message.
+    Stamp,
+    /// The log's publish time.
+    Publish,
+    /// The log's log time.
+    Log,
+}
+
+/// Frame of a velocity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum VelocityFrame {
+    /// The frame of the positions.
+    World,
+    /// The vehicle's, to be turned by the orientation beside the position.
+    Body,
+}
+
+/// How sources are fused.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Fusion {
+    /// The estimator.
+    pub method: FusionMethod,
+    /// Whether the velocity is the derivative of the position (`shared`), or both are fitted apart.
+    pub coefficients: Coefficients,
+    /// What is registered between sources: "auto" for all that the program can, [] for nothing.
+    pub estimate: Registration,
+    /// SFF: knot spacing, s; default: five samples a knot.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub knot_spacing_s: Option<f64>,
+    /// PCF: order of the polynomial; 12 is the paper's best.
+    pub order: usize,
+    /// Moving average: points.
+    pub window_points: usize,
+    /// The longest silence of all sources that the track bridges, s. A guess.
+    pub bridge_max_s: f64,
+}
+
+impl Default for Fusion {
+    fn default() -> Self {
+        Self {
+            method: FusionMethod::Sff,
+            coefficients: Coefficients::Shared,
+            estimate: Registration::Auto(Auto::Auto),
+            knot_spacing_s: None,
+            order: 12,
+            window_points: 16,
+            bridge_max_s: 5.0,
+        }
+    }
+}
+
+/// The estimator.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FusionMethod {
+    /// General data fusion, the weighted mean.
+    Gdf,
+    /// Polynomial constraint fusion.
+    Pcf,
+    /// Spline function fusion.
+    #[default]
+    Sff,
+    /// Moving average over GDF.
+    MovingAverage,
+}
+
+/// Whether position and velocity share coefficients.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Coefficients {
+    /// The velocity is the derivative of the position.
+    #[default]
+    Shared,
+    /// Both are fitted apart, as Zhang 2025 says literally.
+    Independent,
+}
+
+/// What is registered between sources.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Registration {
+    /// All that the program can.
+    Auto(Auto),
+    /// A list of quantities; today only the empty one.
+    List(Vec<String>),
+}
+
+/// The word "auto".
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Auto {
+    /// "auto".
+    Auto,
+}
+
+/// How the track is carried on after the last sample.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Extrapolation {
+    /// The method.
+    pub method: ExtrapolationMethod,
+    /// How far, s; 0 for none.
+    pub horizon_s: f64,
+    /// Order of the polynomial.
+    pub order: usize,
+    /// Length of the stretch that it is fitted to, s; default: 1.4, or what the last 12 samples span.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub window_s: Option<f64>,
+    /// Whether jerk and snap are kept small; without, it is the paper's plain least squares.
+    pub prior: bool,
+    /// Height at which it stops, m: the surface, say.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stop_z_m: Option<f64>,
+}
+
+impl Default for Extrapolation {
+    fn default() -> Self {
+        Self {
+            method: ExtrapolationMethod::Pcf,
+            horizon_s: 2.0,
+            order: 4,
+            window_s: None,
+            prior: true,
+            stop_z_m: None,
+        }
+    }
+}
+
+/// How the track is carried on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum ExtrapolationMethod {
+    /// A constrained polynomial.
+    #[default]
+    Pcf,
+}
+
+/// A height whose first upward crossing is reported.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CharacteristicPoint {
+    /// What to call it.
+    pub name: String,
+    /// The height, m, Z up.
+    pub z_m: f64,
+}
+
+impl Config {
+    /// Reads and checks a config file.
+    ///
+    /// # Errors
+    /// [`ConfigError`] when it can't be read, is no config, or holds a value out of range.
+    pub fn read(path: &Path) -> Result<Self, ConfigError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| ConfigError::Read { path: path.to_owned(), source })?;
+        Self::parse(&text, path)
+    }
+
+    /// Parses and checks a config's text; `path` is for the messages.
+    ///
+    /// # Errors
+    /// [`ConfigError`] when it is no config or holds a value out of range.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, ConfigError> {
+        let config: Self = toml::from_str(text).map_err(|error| {
+            let line = error.span().map(|s| 1 + text[..s.start].matches('\n').count());
+            let message = error.message().replace('\n', " ");
+            let nearest = nearest_key(&message);
+            let message = line.map_or(message.clone(), |line| format!("line {line}: {message}"));
+            ConfigError::Syntax { path: path.to_owned(), message, nearest }
+        })?;
+        config.check()?;
+        Ok(config)
+    }
+
+    /// Checks every value's range.
+    ///
+    /// # Errors
+    /// [`ConfigError::Range`] for the first that is out of it.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        let range = |ok: bool, key: String, value: String, expected| {
+            if ok { Ok(()) } else { Err(ConfigError::Range { key, value, expected }) }
+        };
+        let positive = |key: &str, value: Option<f64>| {
+            let ok = value.is_none_or(|v| v > 0.0 && v.is_finite());
+            range(ok, key.into(), format!("{:?}", value.unwrap_or_default()), "a positive number")
+        };
+        let (output, fusion, beyond) = (&self.output, &self.fusion, &self.extrapolation);
+        let prefix_ok = output.prefix.starts_with('/') && !output.prefix.ends_with('/');
+        range(prefix_ok, "output.prefix".into(), format!("{:?}", output.prefix), "\"/name\"")?;
+        positive("output.rate_hz", output.rate_hz)?;
+        range(
+            output.rate_hz.is_none_or(|r| r <= 10_000.0),
+            "output.rate_hz".into(),
+            format!("{:?}", output.rate_hz.unwrap_or_default()),
+            "at most 10000 Hz",
+        )?;
+        positive("fusion.knot_spacing_s", fusion.knot_spacing_s)?;
+        positive("fusion.bridge_max_s", Some(fusion.bridge_max_s))?;
+        let orders = 1..=crate::estimate::polynomial::MAX_ORDER;
+        range(orders.contains(&fusion.order), "fusion.order".into(), fusion.order.to_string(), "1 to 48")?;
+        range(orders.contains(&beyond.order), "extrapolation.order".into(), beyond.order.to_string(), "1 to 48")?;
+        range(
+            (1..=100_000).contains(&fusion.window_points),
+            "fusion.window_points".into(),
+            fusion.window_points.to_string(),
+            "1 to 100000",
+        )?;
+        let list = match &fusion.estimate {
+            Registration::List(list) => list.join(", "),
+            Registration::Auto(_) => String::new(),
+        };
+        range(list.is_empty(), "fusion.estimate".into(), format!("[{list}]"), "\"auto\" or []")?;
+        let horizon_ok = (0.0..=3600.0).contains(&beyond.horizon_s);
+        range(horizon_ok, "extrapolation.horizon_s".into(), beyond.horizon_s.to_string(), "0 to 3600 s")?;
+        positive("extrapolation.window_s", beyond.window_s)?;
+        range(
+            beyond.stop_z_m.is_none_or(f64::is_finite),
+            "extrapolation.stop_z_m".into(),
+            format!("{:?}", beyond.stop_z_m.unwrap_or_default()),
+            "a finite number",
+        )?;
+        for point in &self.characteristic_point {
+            let key = format!("characteristic_point {:?}: z_m", point.name);
+            range(point.z_m.is_finite(), key, point.z_m.to_string(), "a finite number")?;
+        }
+        range(
+            self.source.len() <= 32,
+            "source".into(),
+            format!("a list of {}", self.source.len()),
+            "at most 32 sources",
+        )?;
+        let datums = self.source.iter().filter(|s| s.datum).count();
+        range(datums <= 1, "source.datum".into(), format!("true for {datums} sources"), "one datum at most")?;
+        for (i, source) in self.source.iter().enumerate() {
+            let key = |k: &str| format!("source {:?}: {k}", source.name);
+            let unique = !source.name.is_empty() && self.source[..i].iter().all(|s| s.name != source.name);
+            range(unique, key("name"), format!("{:?}", source.name), "a name of its own")?;
+            let measures = source.position.is_some() || source.velocity.is_some();
+            range(measures, key("position"), "missing".into(), "a position or a velocity path")?;
+            positive(&key("position_sigma_m"), source.position_sigma_m)?;
+            positive(&key("velocity_sigma_m_s"), source.velocity_sigma_m_s)?;
+            let latency_ok = source.latency_s.abs() <= 3600.0;
+            range(latency_ok, key("latency_s"), source.latency_s.to_string(), "-3600 to 3600 s")?;
+            let offset_ok = source.offset_m.iter().all(|v| v.is_finite());
+            range(offset_ok, key("offset_m"), format!("{:?}", source.offset_m), "three finite numbers")?;
+        }
+        Ok(())
+    }
+}
+
+/// Of an unknown key's message "unknown field `x`, expected one of `a`, `b`": the expected one nearest to x.
+fn nearest_key(message: &str) -> Option<String> {
+    let mut quoted = message.split('`').skip(1).step_by(2);
+    let unknown = message.starts_with("unknown").then(|| quoted.next()).flatten()?;
+    let score = |known: &&str| strsim::jaro_winkler(unknown, known);
+    let best = quoted.max_by(|a, b| score(a).total_cmp(&score(b)))?;
+    (score(&best) > 0.7).then(|| best.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Config, ConfigError> {
+        Config::parse(text, Path::new("trial.toml"))
+    }
+
+    #[test]
+    fn an_empty_config_is_the_default_and_defaults_survive_a_round_trip() {
+        let config = parse("").expect("all keys have defaults");
+        assert_eq!(config, Config::default());
+        let text = toml::to_string(&config).expect("a config is TOML");
+        assert_eq!(parse(&text).expect("its own text"), config);
+    }
+
+    #[test]
+    fn an_unknown_key_names_its_line_and_the_nearest_known_one() {
+        let error = parse("[output]\nrate = 50.0\n").expect_err("no such key");
+        assert_eq!(error.hint().as_deref(), Some("did you mean `rate_hz`?"));
+        assert!(error.to_string().contains("trial.toml: line 2: unknown field `rate`"), "{error}");
+        let error = parse("[fusion]\nmethod = \"spf\"\n").expect_err("no such method");
+        assert_eq!(error.hint().as_deref(), Some("did you mean `sff`?"));
+    }
+
+    #[test]
+    fn values_out_of_range_are_named_with_what_was_expected() {
+        for (text, part) in [
+            ("[output]\nprefix = \"fused\"", "output.prefix is \"fused\", expected \"/name\""),
+            ("[output]\nrate_hz = 0.0", "output.rate_hz is 0.0, expected a positive number"),
+            ("[output]\nrate_hz = nan", "output.rate_hz is NaN"),
+            ("[fusion]\norder = 49", "fusion.order is 49, expected 1 to 48"),
+            ("[extrapolation]\nhorizon_s = -1.0", "extrapolation.horizon_s is -1"),
+            ("[[source]]\nname = \"a\"", "source \"a\": position is missing"),
+            ("[[source]]\nname = \"a\"\nposition = \"/a.p\"\n[[source]]\nname = \"a\"\nposition = \"/b.p\"", "a name of its own"),
+            ("[[source]]\nname = \"a\"\nposition = \"/a.p\"\nposition_sigma_m = -1.0", "position_sigma_m is -1.0"),
+            ("[[characteristic_point]]\nname = \"exit\"\nz_m = inf", "z_m is inf"),
+            ("[fusion]\nestimate = [\"bias\"]", "fusion.estimate is [bias], expected \"auto\" or []"),
+        ] {
+            let error = parse(text).expect_err(text).to_string();
+            assert!(error.contains(part), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn the_schema_in_the_tree_is_the_one_of_this_code() {
+        let schema = serde_json::to_string_pretty(&schemars::schema_for!(Config)).expect("a schema is JSON");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas/config.schema.json");
+        if std::env::var_os("TRACKFUSE_UPDATE_SCHEMAS").is_some() {
+            std::fs::write(&path, format!("{schema}\n")).expect("the tree can be written");
+        }
+        let stored = std::fs::read_to_string(&path).expect("schemas/config.schema.json");
+        assert_eq!(stored.trim_end(), schema, "run the tests once with TRACKFUSE_UPDATE_SCHEMAS=1");
+    }
+}

@@ -1,0 +1,422 @@
+//! The main job on samples: sources in, one track out, with everything that a report says of it.
+//!
+//! 1. Who sees what when ([`coverage`]); a silence longer than `bridge_max_s` cuts the log into pieces.
+//! 2. Each piece is fitted by the method that was asked for.
+//! 3. Where sources overlap they are held against each other ([`agreement`]); while they aren't
+//!    registered, what they differ by widens every band.
+//! 4. The last piece is carried on ([`extrapolation`]), and once more the paper's plain way.
+//! 5. Characteristic points are looked up on the track.
+
+use crate::estimate::EstimateError;
+use crate::estimate::agreement::{self, Disagreement};
+use crate::estimate::characteristic_point::{self, CharacteristicPoint, Height};
+use crate::estimate::coverage::{self, Coverage};
+use crate::estimate::extrapolation::{self, Extrapolation, Holdout};
+use crate::estimate::moving_average::MovingAverage;
+use crate::estimate::spline::{self, Coefficients};
+use crate::estimate::weighted_mean::WeightedMean;
+use crate::estimate::polynomial;
+use crate::sample::{Quantity, Source};
+use crate::time::Time;
+use crate::track::{Curve, Method, Phase, State, Track, TrackPoint};
+
+/// What is to be done, every default resolved.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// The instant that the samples' seconds count from.
+    pub origin: Time,
+    /// The frame of the coordinates.
+    pub frame_id: String,
+    /// Points of the track a second.
+    pub rate_hz: f64,
+    /// The estimator.
+    pub method: Method,
+    /// SFF and PCF: whether velocity is the derivative of position.
+    pub coefficients: Coefficients,
+    /// SFF: knot spacing, s.
+    pub knot_spacing_s: Option<f64>,
+    /// PCF: order.
+    pub order: usize,
+    /// Moving average: points.
+    pub window_points: usize,
+    /// The longest silence of all sources that is bridged, s.
+    pub bridge_max_s: f64,
+    /// How to carry the track on; `None` for not at all.
+    pub extrapolation: Option<extrapolation::Settings>,
+    /// Height at which the extrapolation stops, m.
+    pub stop_z_m: Option<f64>,
+    /// Characteristic points to look for.
+    pub heights: Vec<Height>,
+}
+
+/// One kind of stretch of the track, summed over the log.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhaseSummary {
+    /// The phase.
+    pub phase: Phase,
+    /// The sources that see it: bit i is the i-th.
+    pub seen_by: u32,
+    /// First and last point, s since the origin.
+    pub span_s: (f64, f64),
+    /// Number of points of the track.
+    pub points: usize,
+    /// Root mean square distance of the samples from the track (Zhang 2025, eq. 12, over three axes), m and
+    /// m/s; `None` where nothing was measured.
+    pub rmse: [Option<f64>; 2],
+    /// Root mean square of the points' 3-D standard deviation, m and m/s.
+    pub sigma: [f64; 2],
+}
+
+/// What SFF chose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SplineSummary {
+    /// Number of knots of the last piece, and their spacing, s.
+    pub knots: (usize, f64),
+    /// Weight of the jerk penalty by axis, 1/m^2.
+    pub lambda: [f64; 3],
+    /// Residuals over sigmas by axis: 1 where the sigmas are right.
+    pub noise_scale: [f64; 3],
+}
+
+/// The track and what is to be said of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fusion {
+    /// The fused track with its extrapolation.
+    pub track: Track,
+    /// The paper's plain order-4 extrapolation, for comparison; no points where there is none.
+    pub plain_pcf: Track,
+    /// Characteristic points that were reached.
+    pub events: Vec<CharacteristicPoint>,
+    /// Pieces that were fitted, s since the origin.
+    pub pieces: Vec<(f64, f64)>,
+    /// The track phase by phase.
+    pub phases: Vec<PhaseSummary>,
+    /// How the sources differ where they overlap.
+    pub disagreements: Vec<Disagreement>,
+    /// What SFF chose, where SFF it was.
+    pub spline: Option<SplineSummary>,
+    /// How the extrapolation did from earlier instants.
+    pub holdout: Option<Holdout>,
+    /// What a person must read, a sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// Order of the extrapolation that `/fused/pcf` shows, and the number of last samples it is fitted to:
+/// Zhang 2025's sea trial (order 4, samples 141 to 186).
+const PLAIN_PCF: (usize, usize) = (4, 46);
+
+/// A fitted piece.
+struct Piece {
+    from_s: f64,
+    to_s: f64,
+    sources: Vec<Source>,
+    curve: Box<dyn Curve>,
+    spline: Option<SplineSummary>,
+}
+
+/// Fuses `sources`, each in order of time.
+///
+/// # Errors
+/// [`EstimateError`] of the first piece when no piece of the log can be fitted.
+pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
+    let coverage = Coverage::of(sources);
+    let mut warnings = Vec::new();
+    let pieces = fit_pieces(sources, &coverage, plan, &mut warnings)?;
+
+    let disagreements = agreement::compare(sources);
+    let systematic = Quantity::ALL.map(|q| agreement::systematic_sigma(&disagreements, q));
+    warn_of_disagreement(sources, &coverage, &disagreements, &mut warnings);
+
+    let point = |piece: &dyn Curve, time_s: f64, phase, method, seen_by| {
+        let mut state = piece.at(time_s)?;
+        for axis in 0..3 {
+            state.position_sigma[axis] = state.position_sigma[axis].hypot(systematic[0][axis]);
+            state.velocity_sigma[axis] = state.velocity_sigma[axis].hypot(systematic[1][axis]);
+        }
+        let time = plan.origin.plus_seconds(time_s);
+        Some(TrackPoint { time, state, phase, method, seen_by })
+    };
+
+    let mut points = Vec::new();
+    for piece in &pieces {
+        let start = points.len();
+        for time_s in grid(piece.from_s, piece.to_s, plan.rate_hz) {
+            let seen_by = coverage.seen_by(time_s);
+            points.extend(point(&*piece.curve, time_s, Coverage::phase(seen_by), plan.method, seen_by));
+        }
+        difference_velocities(&mut points[start..]);
+    }
+
+    let (mut plain, mut holdout) = (Vec::new(), None);
+    if let Some((piece, settings)) = pieces.last().zip(plan.extrapolation) {
+        let seconds = beyond(piece.to_s, points.last(), plan, settings.horizon_s);
+        let plain_settings = extrapolation::Settings {
+            order: PLAIN_PCF.0,
+            window_s: last_samples_s(&piece.sources, piece.to_s, PLAIN_PCF.1),
+            prior: None,
+            ..settings
+        };
+        let carry = |settings, stop_z_m: Option<f64>| -> Result<(Vec<TrackPoint>, Extrapolation), _> {
+            let made = extrapolation::extrapolate(&piece.sources, &*piece.curve, piece.from_s, piece.to_s, &settings)?;
+            let carried = seconds
+                .iter()
+                .map_while(|&t| point(&made, t, Phase::Extrapolated, Method::Polynomial, 0))
+                .take_while(|p| stop_z_m.is_none_or(|z| p.state.position[2] <= z))
+                .collect();
+            Ok::<_, EstimateError>((carried, made))
+        };
+        match carry(settings, plan.stop_z_m) {
+            Ok((carried, made)) => {
+                points.extend(carried);
+                holdout = Some(made.holdout);
+            }
+            Err(error) => warnings.push(format!("the track is not extrapolated: {error}")),
+        }
+        if let Ok((carried, _)) = carry(plain_settings, plan.stop_z_m) {
+            plain = carried;
+        }
+    }
+
+    let track = Track { frame_id: plan.frame_id.clone(), points };
+    let mut events = Vec::new();
+    for height in &plan.heights {
+        match characteristic_point::first_crossing(&track, height) {
+            Some(event) => events.push(event),
+            None => warnings.push(format!(
+                "characteristic point {:?}: the track never rises through z = {} m; it is left out",
+                height.name, height.z_m
+            )),
+        }
+    }
+    Ok(Fusion {
+        phases: phases(&track, &pieces, &coverage, plan),
+        plain_pcf: Track { frame_id: plan.frame_id.clone(), points: plain },
+        track,
+        events,
+        spline: pieces.last().and_then(|p| p.spline),
+        pieces: pieces.iter().map(|p| (p.from_s, p.to_s)).collect(),
+        disagreements,
+        holdout,
+        warnings,
+    })
+}
+
+/// Fits every piece that can be, and warns of those that can't.
+fn fit_pieces(
+    sources: &[Source],
+    coverage: &Coverage,
+    plan: &Plan,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Piece>, EstimateError> {
+    let (mut fitted, mut first_error) = (Vec::new(), None);
+    let (mut lost, mut lost_samples, mut lost_at) = (0, 0, None);
+    for (from_s, to_s) in coverage.pieces(plan.bridge_max_s) {
+        let inside: Vec<Source> = sources.iter().map(|s| s.within(from_s, to_s)).collect();
+        match fit(&inside, from_s, to_s, plan) {
+            Ok((curve, spline)) => fitted.push(Piece { from_s, to_s, sources: inside, curve, spline }),
+            Err(error) => {
+                lost += 1;
+                lost_samples += inside.iter().map(Source::len).sum::<usize>();
+                lost_at.get_or_insert(plan.origin.plus_seconds(from_s));
+                first_error.get_or_insert(error);
+            }
+        }
+    }
+    match (fitted.is_empty(), first_error) {
+        (true, Some(error)) => return Err(error),
+        (true, None) => {
+            let what = plan.method.name().to_owned();
+            return Err(EstimateError::TooFewSamples { what, needed: spline::MIN_SAMPLES, got: 0 });
+        }
+        _ => {}
+    }
+    if let Some(at) = lost_at {
+        warnings.push(format!(
+            "{lost_samples} samples stand more than {} s away from all others, in {lost} stretches too short \
+             to fit, the first at {at}: left out (wrong stamps?)",
+            plan.bridge_max_s
+        ));
+    }
+    if fitted.len() > 1 {
+        let longest = fitted.windows(2).map(|w| w[1].from_s - w[0].to_s).fold(0.0, f64::max);
+        warnings.push(format!(
+            "nobody sees the vehicle for up to {longest:.1} s, more than bridge_max_s = {} s: the track is cut \
+             into {} pieces",
+            plan.bridge_max_s,
+            fitted.len()
+        ));
+    }
+    Ok(fitted)
+}
+
+type Fitted = (Box<dyn Curve>, Option<SplineSummary>);
+
+fn fit(sources: &[Source], from_s: f64, to_s: f64, plan: &Plan) -> Result<Fitted, EstimateError> {
+    let got: usize = sources.iter().map(Source::len).sum();
+    if got < spline::MIN_SAMPLES {
+        let what = plan.method.name().to_owned();
+        return Err(EstimateError::TooFewSamples { what, needed: spline::MIN_SAMPLES, got });
+    }
+    match plan.method {
+        Method::Spline => {
+            let settings = spline::Settings {
+                knot_spacing_s: plan.knot_spacing_s.map(|s| bounded_spacing(s, got, from_s, to_s)),
+                coefficients: plan.coefficients,
+                ..spline::Settings::default()
+            };
+            let fitted = spline::fit(sources, from_s, to_s, &settings)?;
+            let summary = SplineSummary {
+                knots: fitted.knots(),
+                lambda: fitted.lambda(),
+                noise_scale: fitted.noise_scale(),
+            };
+            Ok((Box::new(fitted), Some(summary)))
+        }
+        Method::Polynomial => {
+            let fitted = polynomial::fit(sources, from_s, to_s, plan.order, plan.coefficients, None)?;
+            Ok((Box::new(fitted), None))
+        }
+        Method::WeightedMean => Ok((Box::new(WeightedMean::new(sources.to_vec())), None)),
+        Method::MovingAverage => {
+            let mean = WeightedMean::new(sources.to_vec());
+            let times = grid(from_s, to_s, plan.rate_hz);
+            let average = MovingAverage::of(&mean, times, plan.window_points, 1.5 / plan.rate_hz)?;
+            Ok((Box::new(average), None))
+        }
+    }
+}
+
+/// No more knots than samples, whatever spacing was asked for.
+fn bounded_spacing(spacing_s: f64, samples: usize, from_s: f64, to_s: f64) -> f64 {
+    spacing_s.max((to_s - from_s) / samples as f64)
+}
+
+/// Instants from `from_s` on, `1 / rate_hz` apart, up to `to_s`.
+fn grid(from_s: f64, to_s: f64, rate_hz: f64) -> impl Iterator<Item = f64> {
+    let count = ((to_s - from_s) * rate_hz + 1e-6).floor().max(0.0) as usize;
+    (0..=count).map(move |i| (from_s + i as f64 / rate_hz).min(to_s))
+}
+
+/// The grid's instants after the last point, up to `horizon_s` after the last sample at `to_s`.
+fn beyond(to_s: f64, last: Option<&TrackPoint>, plan: &Plan, horizon_s: f64) -> Vec<f64> {
+    let start = last.map_or(to_s, |p| p.time.seconds_since(plan.origin)).min(to_s);
+    grid(start, to_s + horizon_s, plan.rate_hz).filter(|&t| t > to_s).collect()
+}
+
+/// The length of the stretch before `to_s` that holds the last `count` sampling instants, s.
+fn last_samples_s(sources: &[Source], to_s: f64, count: usize) -> f64 {
+    let mut times: Vec<f64> = sources.iter().flat_map(|s| &s.positions).map(|p| p.time_s).collect();
+    times.sort_by(f64::total_cmp);
+    let first = times.len().saturating_sub(count);
+    times.get(first).map_or(0.0, |t| to_s - t)
+}
+
+/// Gives points without an acceleration the difference of their neighbours' velocities, as the paper does.
+fn difference_velocities(points: &mut [TrackPoint]) {
+    let slopes: Vec<[f64; 3]> = (0..points.len())
+        .map(|i| {
+            let (a, b) = (&points[i.saturating_sub(1)], &points[(i + 1).min(points.len() - 1)]);
+            let dt = b.time.seconds_since(a.time).max(1e-9);
+            std::array::from_fn(|axis| (b.state.velocity[axis] - a.state.velocity[axis]) / dt)
+        })
+        .collect();
+    for (point, slope) in points.iter_mut().zip(slopes) {
+        point.state.acceleration.get_or_insert(slope);
+    }
+}
+
+fn warn_of_disagreement(
+    sources: &[Source],
+    coverage: &Coverage,
+    disagreements: &[Disagreement],
+    warnings: &mut Vec<String>,
+) {
+    for d in disagreements.iter().filter(|d| d.is_significant()) {
+        let (first, second) = (&sources[d.sources.0].name, &sources[d.sources.1].name);
+        let (what, unit) = (d.quantity.name(), d.quantity.unit());
+        let [x, y, z] = d.median;
+        warnings.push(format!(
+            "{second} and {first} disagree in {what} by more than their sigmas and are not registered: \
+             {second} - {first} = ({x:+.2}, {y:+.2}, {z:+.2}) {unit}; the track lies between them and every \
+             band is widened by that much",
+        ));
+    }
+    for second in 0..sources.len() {
+        for first in 0..second {
+            let meet = coverage.runs(first).iter().any(|a| {
+                coverage.runs(second).iter().any(|b| a.0 <= b.1 && b.0 <= a.1)
+            });
+            if !meet {
+                warnings.push(format!(
+                    "{} and {} never see the vehicle at the same time: nobody can say whether they agree, and \
+                     the bands don't hold a disagreement",
+                    sources[first].name, sources[second].name
+                ));
+            }
+        }
+    }
+}
+
+/// Sums up the track and the samples' distances from it, phase by phase, in order of first appearance.
+fn phases(track: &Track, pieces: &[Piece], coverage: &Coverage, plan: &Plan) -> Vec<PhaseSummary> {
+    let mut summaries: Vec<PhaseSummary> = Vec::new();
+    let find = |summaries: &mut Vec<PhaseSummary>, phase, seen_by, t: f64| -> usize {
+        let known = summaries.iter().position(|s| s.phase == phase && s.seen_by == seen_by);
+        known.unwrap_or_else(|| {
+            let (span_s, points) = ((t, t), 0);
+            summaries.push(PhaseSummary { phase, seen_by, span_s, points, rmse: [None; 2], sigma: [0.0; 2] });
+            summaries.len() - 1
+        })
+    };
+    for point in &track.points {
+        let t = point.time.seconds_since(plan.origin);
+        let index = find(&mut summaries, point.phase, point.seen_by, t);
+        let summary = &mut summaries[index];
+        summary.span_s.1 = t;
+        summary.points += 1;
+        summary.sigma[0] += norm_squared(point.state.position_sigma);
+        summary.sigma[1] += norm_squared(point.state.velocity_sigma);
+    }
+    let mut sums = vec![[(0.0, 0_usize); 2]; summaries.len()];
+    for piece in pieces {
+        for sample in piece.sources.iter().flat_map(|s| Quantity::ALL.map(|q| (q, s.series(q)))) {
+            let (quantity, series) = sample;
+            for sample in series {
+                let seen_by = coverage.seen_by(sample.time_s);
+                let phase = Coverage::phase(seen_by);
+                let Some(index) = summaries.iter().position(|s| s.phase == phase && s.seen_by == seen_by) else {
+                    continue;
+                };
+                if let Some(state) = piece.curve.at(sample.time_s) {
+                    let sum = &mut sums[index][quantity as usize];
+                    sum.0 += norm_squared(residual(sample.value, &state, quantity)); // (12)
+                    sum.1 += 1;
+                }
+            }
+        }
+    }
+    for (summary, sums) in summaries.iter_mut().zip(sums) {
+        summary.rmse = sums.map(|(sum, count)| (count > 0).then(|| (sum / count as f64).sqrt()));
+        summary.sigma = summary.sigma.map(|s| (s / summary.points.max(1) as f64).sqrt());
+    }
+    summaries
+}
+
+fn residual(value: [f64; 3], state: &State, quantity: Quantity) -> [f64; 3] {
+    let fitted = match quantity {
+        Quantity::Position => state.position,
+        Quantity::Velocity => state.velocity,
+    };
+    std::array::from_fn(|i| value[i] - fitted[i])
+}
+
+fn norm_squared(v: [f64; 3]) -> f64 {
+    v.iter().map(|x| x * x).sum()
+}
+
+/// The rate of the fastest source, Hz: what the track's defaults to.
+#[must_use]
+pub fn fastest_rate_hz(sources: &[Source]) -> Option<f64> {
+    let intervals = sources.iter().filter_map(coverage::median_interval_s);
+    intervals.reduce(f64::min).map(|s| s.recip().clamp(1e-3, 1e4))
+}
