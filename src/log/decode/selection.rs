@@ -167,3 +167,58 @@ impl<'d> Place<'d> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::Decoder;
+    use super::*;
+
+    const BEACONS: &str = "string name\nFix[] fixes\nuint8[] raw\n\
+        ===\nMSG: p/Fix\nint32 id\nPoint p\nfloat64[3] sigma\n===\nMSG: p/Point\nfloat64 x\nfloat64 y\nfloat64 z";
+
+    fn select(paths: &[&str]) -> Result<String, String> {
+        let paths: Vec<_> = paths.iter().map(|path| MessagePath::parse(path).unwrap()).collect();
+        let decoder = Decoder::new("cdr", "ros2msg", "p/msg/Beacons", BEACONS.as_bytes()).unwrap();
+        match decoder.select(&paths).map_err(|miss| miss.to_string())?.format {
+            super::super::Format::Cdr { pick, .. } => Ok(written(&pick)),
+            super::super::Format::Json => unreachable!("a cdr decoder"),
+        }
+    }
+
+    /// One character a field: `*` all, `-` nothing, else its own fields in brackets.
+    fn written(pick: &Pick) -> String {
+        match pick {
+            Pick::All => "*".to_owned(),
+            Pick::Fields(picks) => {
+                let fields = picks.iter().map(|pick| pick.as_ref().map_or("-".to_owned(), written));
+                format!("({})", fields.collect::<String>())
+            }
+        }
+    }
+
+    #[test]
+    fn paths_together_pick_what_each_of_them_needs() {
+        assert_eq!(select(&[]).unwrap(), "(---)");
+        assert_eq!(select(&["/b"]).unwrap(), "*");
+        assert_eq!(select(&["/b.fixes[0].p"]).unwrap(), "(-(-*-)-)");
+        assert_eq!(select(&["/b.fixes[0].p.x", "/b.fixes[1].sigma[2]"]).unwrap(), "(-(-(*--)*)-)");
+        assert_eq!(select(&["/b.fixes[0]", "/b.fixes[0].p.x", "/b.fixes[0].id"]).unwrap(), "(-*-)");
+        assert_eq!(select(&["/b.fixes[0].p.x", "/b.fixes[0]"]).unwrap(), "(-*-)");
+    }
+
+    #[test]
+    fn a_filter_needs_its_own_field_too() {
+        assert_eq!(select(&["/b.fixes[:]{id==2}.p"]).unwrap(), "(-(**-)-)");
+        assert_eq!(select(&["/b{name=='a'}.fixes[0].sigma"]).unwrap(), "(*(--*)-)");
+    }
+
+    #[test]
+    fn a_path_that_no_message_can_follow_is_refused_before_the_first() {
+        let miss = |path| select(&[path]).unwrap_err();
+        assert_eq!(miss("/b.fixes[0].q"), "no field \"q\" in /b.fixes[0]; it has: id, p, sigma");
+        assert_eq!(miss("/b.fixes[:]{idd==1}"), "no field \"idd\" in /b.fixes; it has: id, p, sigma");
+        assert_eq!(miss("/b.fixes.p"), "/b.fixes is an array, expected an object for the step .p");
+        assert_eq!(miss("/b.name[0]"), "/b.name is text, expected an array for the step [0]");
+        assert_eq!(miss("/b.raw[0]"), "/b.raw is an array of bytes, expected an array for the step [0]");
+    }
+}
