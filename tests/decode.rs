@@ -1,4 +1,6 @@
 //! The decoders against real recordings; `decode_golden.py` made the numbers.
+#![expect(clippy::unwrap_used, reason = "a helper of tests may panic as they do")]
+#![expect(clippy::unreadable_literal, reason = "numbers as the script prints them")]
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -48,7 +50,7 @@ fn every_json_and_cdr_message_of_the_recordings_decodes() {
                     decoded += 1;
                 }
                 Err(e) if channel.topic.ends_with("/_service_event") => {
-                    assert!(e.contains("services"), "{e}")
+                    assert!(e.contains("services"), "{e}");
                 }
                 Err(e) => {
                     let foreign = ["ros1", "wrong_format"].contains(&channel.message_encoding.as_str());

@@ -1,8 +1,8 @@
 //! The layout of a message type: a tree of structs, whatever language it was defined in.
 //!
-//! A parser hands over a [`RawDefinition`], whose types name each other; [`resolve`] links them. The result is finite: no
-//! type holds itself, nesting ends at [`MAX_DEPTH`], and every element takes at least one byte, so that the
-//! bytes of a message bound what is allocated for it.
+//! A parser hands over a [`RawDefinition`], whose types name each other; [`resolve`] links them. The result is
+//! finite: no type holds itself, nesting ends at [`MAX_DEPTH`], and every element takes at least one byte, so
+//! that the bytes of a message bound what is allocated for it.
 
 use std::collections::HashMap;
 use std::sync::Arc;

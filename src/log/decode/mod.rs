@@ -187,3 +187,47 @@ impl DecodeError {
         self
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(message_encoding: &str, schema_encoding: &str) -> String {
+        Decoder::new(message_encoding, schema_encoding, "p/msg/T", b"bool a").unwrap_err().to_string()
+    }
+
+    #[test]
+    fn an_encoding_that_nothing_reads_is_an_error_that_names_what_is_read() {
+        assert_eq!(
+            refusal("ros1", "ros1msg"),
+            "message encoding \"ros1\" is not supported, expected cdr or json"
+        );
+        assert_eq!(
+            refusal("cdr", "ros2idl"),
+            "schema encoding \"ros2idl\" of cdr messages is not supported, expected ros2msg"
+        );
+        assert_eq!(
+            refusal("cdr", ""),
+            "schema encoding \"\" of cdr messages is not supported, expected ros2msg"
+        );
+    }
+
+    #[test]
+    fn json_needs_no_schema_and_a_selection_of_it_checks_no_path() {
+        let decoder = Decoder::new("json", "", "", b"").unwrap();
+        let path = MessagePath::parse("/t.position.x").unwrap();
+        let selected = decoder.select(std::slice::from_ref(&path)).unwrap();
+        let message = selected.decode(br#"{"position": null}"#).unwrap();
+        let miss = path.resolve(&message).unwrap_err().to_string();
+        assert_eq!(miss, "/t.position is null, expected an object for the step .x");
+    }
+
+    #[test]
+    fn a_selection_of_a_selection_starts_from_the_whole_message() {
+        let decoder = Decoder::new("cdr", "ros2msg", "p/msg/T", b"uint8 a\nuint8 b").unwrap();
+        let [a, b] = ["/t.a", "/t.b"].map(|path| MessagePath::parse(path).unwrap());
+        let selected = decoder.select(&[a]).unwrap().select(std::slice::from_ref(&b)).unwrap();
+        let message = selected.decode(&[0, 1, 0, 0, 5, 6]).unwrap();
+        assert_eq!(b.resolve(&message), Ok(Some(&Value::Uint(6))));
+    }
+}
