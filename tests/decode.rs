@@ -69,8 +69,7 @@ fn every_json_and_cdr_message_of_the_recordings_decodes() {
 
 /// The field at `path` of the topic's message number `index`, in the order of `log_time`, is `expected`:
 /// whole numbers by value, the rest exactly. So it is when only that field is decoded.
-fn golden(file: &str, index: usize, path: &str, expected: &Value) {
-    let Some(dir) = test_data() else { return };
+fn golden(dir: &Path, file: &str, index: usize, path: &str, expected: &Value) {
     let path = MessagePath::parse(path).unwrap();
     let bytes = std::fs::read(dir.join(file)).unwrap();
     let stream = MessageStream::new(&bytes).unwrap().map(Result::unwrap);
@@ -93,93 +92,134 @@ fn text(text: &str) -> Value {
 }
 
 #[test]
-fn cdr_fields_are_those_of_an_independent_decoder() {
-    golden("flight_two_sensors.mcap", 1234, "/cub1/pose.header.stamp.sec", &Value::Int(1763073222));
-    golden("flight_two_sensors.mcap", 1234, "/cub1/pose.header.stamp.nanosec", &Value::Int(289258386));
-    golden("flight_two_sensors.mcap", 1234, "/cub1/pose.header.frame_id", &text("qualisys"));
-    golden("flight_two_sensors.mcap", 1234, "/cub1/pose.pose.position.x", &Value::Float(-7.95190625));
-    golden("flight_two_sensors.mcap", 1234, "/cub1/pose.pose.position.y", &Value::Float(-3.768822265625));
-    golden("flight_two_sensors.mcap", 1234, "/cub1/pose.pose.position.z", &Value::Float(2.568865478515625));
+fn cdr_positions_and_velocities_are_those_of_an_independent_decoder() {
+    let Some(dir) = test_data() else { return };
+    golden(&dir, "flight_two_sensors.mcap", 1234, "/cub1/pose.header.stamp.sec", &Value::Int(1763073222));
+    golden(&dir, "flight_two_sensors.mcap", 1234, "/cub1/pose.header.stamp.nanosec", &Value::Int(289258386));
+    golden(&dir, "flight_two_sensors.mcap", 1234, "/cub1/pose.header.frame_id", &text("qualisys"));
+    golden(&dir, "flight_two_sensors.mcap", 1234, "/cub1/pose.pose.position.x", &Value::Float(-7.95190625));
     golden(
+        &dir,
+        "flight_two_sensors.mcap",
+        1234,
+        "/cub1/pose.pose.position.y",
+        &Value::Float(-3.768822265625),
+    );
+    golden(
+        &dir,
+        "flight_two_sensors.mcap",
+        1234,
+        "/cub1/pose.pose.position.z",
+        &Value::Float(2.568865478515625),
+    );
+    golden(
+        &dir,
         "flight_two_sensors.mcap",
         1234,
         "/cub1/pose.pose.orientation.w",
         &Value::Float(0.43199974102042055),
     );
-    golden("flight_two_sensors.mcap", 77, "/gauge/velocity.header.stamp.nanosec", &Value::Int(690561056));
-    golden("flight_two_sensors.mcap", 77, "/gauge/velocity.twist.linear.x", &Value::Float(4.094149446806737));
     golden(
+        &dir,
+        "flight_two_sensors.mcap",
+        77,
+        "/gauge/velocity.header.stamp.nanosec",
+        &Value::Int(690561056),
+    );
+    golden(
+        &dir,
+        "flight_two_sensors.mcap",
+        77,
+        "/gauge/velocity.twist.linear.x",
+        &Value::Float(4.094149446806737),
+    );
+    golden(
+        &dir,
         "flight_two_sensors.mcap",
         77,
         "/gauge/velocity.twist.linear.y",
         &Value::Float(-1.0076257766254053),
     );
     golden(
+        &dir,
         "flight_two_sensors.mcap",
         77,
         "/gauge/velocity.twist.linear.z",
         &Value::Float(-0.07762948547558927),
     );
-    golden("flight_two_sensors.mcap", 159, "/beacon/odom.header.stamp.nanosec", &Value::Int(944678545));
-    golden("flight_two_sensors.mcap", 159, "/beacon/odom.child_frame_id", &text("vehicle"));
+    golden(&dir, "flight_two_sensors.mcap", 159, "/beacon/odom.header.stamp.nanosec", &Value::Int(944678545));
+    golden(&dir, "flight_two_sensors.mcap", 159, "/beacon/odom.child_frame_id", &text("vehicle"));
     golden(
+        &dir,
         "flight_two_sensors.mcap",
         159,
         "/beacon/odom.pose.pose.position.x",
         &Value::Float(-5.083071568673487),
     );
     golden(
+        &dir,
         "flight_two_sensors.mcap",
         159,
         "/beacon/odom.pose.pose.position.z",
         &Value::Float(1.8704146843124831),
     );
-    golden("flight_two_sensors.mcap", 159, "/beacon/odom.pose.covariance[35]", &Value::Float(0.0225));
+    golden(&dir, "flight_two_sensors.mcap", 159, "/beacon/odom.pose.covariance[35]", &Value::Float(0.0225));
     golden(
+        &dir,
         "flight_two_sensors.mcap",
         159,
         "/beacon/odom.twist.twist.linear.y",
         &Value::Float(3.07891413466827),
     );
-    golden("flight_two_sensors.mcap", 159, "/beacon/odom.twist.covariance[0]", &Value::Float(0.0225));
-    golden("flight_two_sensors.mcap", 159, "/beacon/odom.twist.covariance[1]", &Value::Float(0.0));
-    golden("rosbag2/cdr_test_0.mcap", 2, "/test_topic.bool_value", &Value::Bool(false));
-    golden("rosbag2/cdr_test_0.mcap", 2, "/test_topic.int32_value", &Value::Int(123));
-    golden("rosbag2/cdr_test_0.mcap", 2, "/test_topic.uint64_value", &Value::Int(0));
-    golden("rosbag2/cdr_test_0.mcap", 3, "/array_topic.bool_values[2]", &Value::Bool(true));
-    golden("rosbag2/cdr_test_0.mcap", 3, "/array_topic.string_values[2]", &text("Complex Hello3"));
+    golden(&dir, "flight_two_sensors.mcap", 159, "/beacon/odom.twist.covariance[0]", &Value::Float(0.0225));
+    golden(&dir, "flight_two_sensors.mcap", 159, "/beacon/odom.twist.covariance[1]", &Value::Float(0.0));
+}
+
+#[test]
+fn cdr_arrays_texts_and_nested_types_are_those_of_an_independent_decoder() {
+    let Some(dir) = test_data() else { return };
+    golden(&dir, "rosbag2/cdr_test_0.mcap", 2, "/test_topic.bool_value", &Value::Bool(false));
+    golden(&dir, "rosbag2/cdr_test_0.mcap", 2, "/test_topic.int32_value", &Value::Int(123));
+    golden(&dir, "rosbag2/cdr_test_0.mcap", 2, "/test_topic.uint64_value", &Value::Int(0));
+    golden(&dir, "rosbag2/cdr_test_0.mcap", 3, "/array_topic.bool_values[2]", &Value::Bool(true));
+    golden(&dir, "rosbag2/cdr_test_0.mcap", 3, "/array_topic.string_values[2]", &text("Complex Hello3"));
     golden(
+        &dir,
         "rosbag2/cdr_test_0.mcap",
         3,
         "/array_topic.defaults_values[2].uint64_value",
         &Value::Int(50000000),
     );
-    golden("rosbag2/cdr_test_0.mcap", 3, "/array_topic.string_values_default[1]", &text("max value"));
-    golden("rosbag2/cdr_test_0.mcap", 3, "/array_topic.alignment_check", &Value::Int(0));
-    golden("rosbag2/talker.mcap", 9, "/rosout.stamp.sec", &Value::Int(1585866239));
-    golden("rosbag2/talker.mcap", 9, "/rosout.msg", &text("Publishing: 'Hello, world! 9'"));
-    golden("rosbag2/talker.mcap", 9, "/rosout.line", &Value::Int(38));
-    golden("rosbag2/only_topics.mcap", 6, "/parameter_events.node", &text("/introspection_client"));
+    golden(&dir, "rosbag2/cdr_test_0.mcap", 3, "/array_topic.string_values_default[1]", &text("max value"));
+    golden(&dir, "rosbag2/cdr_test_0.mcap", 3, "/array_topic.alignment_check", &Value::Int(0));
+    golden(&dir, "rosbag2/talker.mcap", 9, "/rosout.stamp.sec", &Value::Int(1585866239));
+    golden(&dir, "rosbag2/talker.mcap", 9, "/rosout.msg", &text("Publishing: 'Hello, world! 9'"));
+    golden(&dir, "rosbag2/talker.mcap", 9, "/rosout.line", &Value::Int(38));
+    golden(&dir, "rosbag2/only_topics.mcap", 6, "/parameter_events.node", &text("/introspection_client"));
     golden(
+        &dir,
         "rosbag2/only_topics.mcap",
         6,
         "/parameter_events.new_parameters[0].name",
         &text("client_configure_introspection"),
     );
     golden(
+        &dir,
         "rosbag2/only_topics.mcap",
         6,
         "/parameter_events.new_parameters[0].value.string_value",
         &text("disabled"),
     );
-    golden("others/autoferry_s02.mcap", 200, "/lidar/detections.header.frame_id", &text("piren_ned"));
+    golden(&dir, "others/autoferry_s02.mcap", 200, "/lidar/detections.header.frame_id", &text("piren_ned"));
     golden(
+        &dir,
         "others/autoferry_s02.mcap",
         200,
         "/lidar/detections.poses[0].position.x",
         &Value::Float(-0.8167368173599243),
     );
     golden(
+        &dir,
         "others/autoferry_s02.mcap",
         200,
         "/lidar/detections.poses[-1].position.y",
@@ -189,12 +229,13 @@ fn cdr_fields_are_those_of_an_independent_decoder() {
 
 #[test]
 fn json_fields_are_those_of_an_independent_decoder() {
-    golden("climbs/async_0.mcap", 100, "/tether/track.timestamp.nsec", &Value::Int(0));
-    golden("climbs/async_0.mcap", 100, "/tether/track.position.x", &Value::Float(2.97688));
-    golden("climbs/async_0.mcap", 100, "/tether/track.velocity.z", &Value::Float(8.897641));
-    golden("others/nbp1406_rv_palmer.mcap", 4999, "/knudsen/depth.depth_m", &Value::Float(4252.39));
-    golden("others/nbp1406_rv_palmer.mcap", 4999, "/knudsen/depth.valid", &Value::Bool(true));
-    golden("others/nbp1406_rv_palmer.mcap", 4999, "/knudsen/depth.lat", &Value::Float(-23.76523));
-    golden("others/nbp1406_rv_palmer.mcap", 4999, "/knudsen/depth.lon", &Value::Float(-19.497662));
-    golden("others/nbp1406_rv_palmer.mcap", 4999, "/knudsen/depth.sound_speed", &Value::Float(1500.0));
+    let Some(dir) = test_data() else { return };
+    golden(&dir, "climbs/async_0.mcap", 100, "/tether/track.timestamp.nsec", &Value::Int(0));
+    golden(&dir, "climbs/async_0.mcap", 100, "/tether/track.position.x", &Value::Float(2.97688));
+    golden(&dir, "climbs/async_0.mcap", 100, "/tether/track.velocity.z", &Value::Float(8.897641));
+    golden(&dir, "others/nbp1406_rv_palmer.mcap", 4999, "/knudsen/depth.depth_m", &Value::Float(4252.39));
+    golden(&dir, "others/nbp1406_rv_palmer.mcap", 4999, "/knudsen/depth.valid", &Value::Bool(true));
+    golden(&dir, "others/nbp1406_rv_palmer.mcap", 4999, "/knudsen/depth.lat", &Value::Float(-23.76523));
+    golden(&dir, "others/nbp1406_rv_palmer.mcap", 4999, "/knudsen/depth.lon", &Value::Float(-19.497662));
+    golden(&dir, "others/nbp1406_rv_palmer.mcap", 4999, "/knudsen/depth.sound_speed", &Value::Float(1500.0));
 }
