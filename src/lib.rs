@@ -4,6 +4,7 @@
 pub mod config;
 pub mod estimate;
 pub mod fusion;
+pub mod log;
 pub mod math;
 pub mod sample;
 pub mod time;

@@ -1,0 +1,3 @@
+//! MCAP at both ends; nothing else knows MCAP.
+
+pub mod decode;
