@@ -1,4 +1,5 @@
 //! `trackfuse`
 #![forbid(unsafe_code)]
 
+pub mod log;
 pub mod time;
