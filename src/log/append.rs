@@ -16,7 +16,7 @@ use super::index::SummaryRecord;
 use super::output::{Sink, check_output};
 use super::summary::{self, encode, encode_body, encode_bytes};
 use super::survey::count;
-use super::{Log, LogError};
+use super::{Index, Log, LogError};
 
 /// A viewer's seek then loads at most this much more than before.
 const CHUNK_BYTES: usize = 4_000_000;
@@ -167,7 +167,7 @@ impl<'a> Appender<'a> {
             channels: Vec::new(),
             chunk: Chunk::default(),
             summary: Vec::new(),
-            statistics: log.index().statistics.clone().unwrap_or_default(),
+            statistics: statistics_of(log.index()),
             messages: 0,
         };
         // Before all chunks, so that each is readable on its own and a channel without messages is there.
@@ -316,6 +316,18 @@ impl<'a> Appender<'a> {
     fn cannot_write(&self, source: io::Error) -> LogError {
         LogError::Write { path: self.out.clone(), source }
     }
+}
+
+/// The log's statistics, with counts that aren't below what is there: some writers count only what
+/// has messages.
+fn statistics_of(index: &Index) -> Statistics {
+    let mut statistics = index.statistics.clone().unwrap_or_default();
+    statistics.schema_count = statistics.schema_count.max(index.schemas.len() as u16);
+    statistics.channel_count = statistics.channel_count.max(index.channels.len() as u32);
+    statistics.attachment_count = index.attachments.len() as u32;
+    statistics.metadata_count = index.metadata.len() as u32;
+    statistics.chunk_count = index.chunks.len() as u32;
+    statistics
 }
 
 /// The messages of the chunk that is being filled.
