@@ -1,3 +1,32 @@
-//! MCAP at both ends; nothing else knows MCAP.
+//! MCAP at both ends, and nothing else knows MCAP.
+//!
+//! A recording is read through its summary: [`Log::open`] costs the same whatever the chunks hold.
+//! Where the summary leaves something out, [`Log::open`] finds it in the data section instead.
+//! New channels are put behind the old ones with an [`Appender`]:
+//!
+//! ```text
+//! in.mcap    | magic, header, chunks ... | DataEnd | summary                 | footer |
+//!            |  every byte, same offset  |
+//! out.mcap   | magic, header, chunks ... | new chunks | DataEnd | old + new summary | footer |
+//! ```
+//!
+//! Nothing that a file claims is believed before it is checked: lengths against the file before
+//! memory is taken, checksums before content is handed on.
 
+mod append;
+mod chunk;
 pub mod decode;
+mod error;
+mod file;
+mod ids;
+mod index;
+mod messages;
+mod output;
+mod summary;
+mod survey;
+
+pub use append::{Appender, Compression, NewChannel, NewMessage, NewMetadata, Written};
+pub use error::{LogError, Obstacle};
+pub use index::{Index, Log, Schema};
+pub use mcap::records::{AttachmentIndex, Channel, ChunkIndex, MetadataIndex, Statistics};
+pub use messages::{Message, OwnedMessage};

@@ -1,0 +1,357 @@
+//! A log's successor: its data section byte for byte, new chunks behind it, a summary of both.
+
+use std::{
+    collections::BTreeMap,
+    io::{self, Write},
+    path::{Path, PathBuf},
+};
+
+use mcap::records::{
+    Channel, ChunkHeader, ChunkIndex, DataEnd, MessageHeader, MessageIndex, MessageIndexEntry, MetadataIndex,
+    SchemaHeader, Statistics, op,
+};
+
+use super::ids::{Ids, assign_ids};
+use super::index::SummaryRecord;
+use super::output::{Sink, check_output};
+use super::summary::{self, encode, encode_body, encode_bytes};
+use super::survey::count;
+use super::{Index, Log, LogError};
+
+/// A viewer's seek then loads at most this much more than before.
+const CHUNK_BYTES: usize = 4_000_000;
+/// And at most this much log time.
+const CHUNK_NS: u64 = 30_000_000_000;
+
+/// A channel to be added.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NewChannel {
+    /// Its name, new to the log.
+    pub topic: String,
+    /// Such as `json`.
+    pub message_encoding: String,
+    /// Such as `trackfuse.TrackPoint`.
+    pub schema_name: String,
+    /// Such as `jsonschema`.
+    pub schema_encoding: String,
+    /// The definition itself. Channels with the same name, encoding and definition share a schema.
+    pub schema: Vec<u8>,
+    /// For people and other programs.
+    pub metadata: BTreeMap<String, String>,
+}
+
+impl NewChannel {
+    /// A channel of JSON messages that follow a JSON Schema.
+    #[must_use]
+    pub fn json(topic: &str, schema_name: &str, schema: &str) -> Self {
+        Self {
+            topic: topic.to_owned(),
+            message_encoding: "json".to_owned(),
+            schema_name: schema_name.to_owned(),
+            schema_encoding: "jsonschema".to_owned(),
+            schema: schema.as_bytes().to_vec(),
+            metadata: BTreeMap::new(),
+        }
+    }
+}
+
+/// A message to be added.
+#[derive(Clone, Copy, Debug)]
+pub struct NewMessage<'a> {
+    /// Which of the new channels, counted from 0.
+    pub channel: usize,
+    /// Both its log time and its publish time, in ns.
+    pub time_ns: u64,
+    /// The payload, in the channel's encoding.
+    pub data: &'a [u8],
+}
+
+/// A metadata record to be added. Some tools refuse a name that is in a log twice.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NewMetadata {
+    /// Its name.
+    pub name: String,
+    /// Its content.
+    pub entries: BTreeMap<String, String>,
+}
+
+/// How new chunks are compressed; old ones stay as they are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Compression {
+    /// Small, and fast to read.
+    #[default]
+    Zstd,
+    /// Larger, and faster still.
+    Lz4,
+    /// As the messages are.
+    None,
+}
+
+impl Compression {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Zstd => "zstd",
+            Self::Lz4 => "lz4",
+            Self::None => "",
+        }
+    }
+
+    fn compress(self, bytes: &[u8]) -> io::Result<Vec<u8>> {
+        match self {
+            Self::Zstd => zstd::bulk::compress(bytes, zstd::DEFAULT_COMPRESSION_LEVEL),
+            Self::Lz4 => {
+                let mut encoder = lz4::EncoderBuilder::new().build(Vec::new())?;
+                encoder.write_all(bytes)?;
+                let (compressed, finished) = encoder.finish();
+                finished.map(|()| compressed)
+            }
+            Self::None => Ok(bytes.to_vec()),
+        }
+    }
+}
+
+/// What was written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Written {
+    /// Where.
+    pub path: PathBuf,
+    /// Length of the whole output in bytes.
+    pub len: u64,
+    /// How many messages were added.
+    pub messages: u64,
+}
+
+/// Writes a log's successor. Until [`Appender::finish`] nothing bears the output's name, and a
+/// dropped appender leaves nothing behind.
+#[derive(Debug)]
+pub struct Appender<'a> {
+    log: &'a Log,
+    out: PathBuf,
+    force: bool,
+    compression: Compression,
+    sink: Sink,
+    /// Id and next sequence number, by the new channel's place.
+    channels: Vec<(u16, u32)>,
+    chunk: Chunk,
+    summary: Vec<SummaryRecord>,
+    statistics: Statistics,
+    messages: u64,
+}
+
+impl<'a> Appender<'a> {
+    /// Starts the successor of `log` that will be `out`, with all `channels`, and copies the data
+    /// section. All checks come before the copy.
+    ///
+    /// # Errors
+    /// [`LogError::NotAppendable`]; [`LogError::OutputIsInput`]; [`LogError::OutputExists`] without
+    /// `force`; [`LogError::TopicTaken`] also for a topic given twice; [`LogError::IdsExhausted`];
+    /// [`LogError::Write`].
+    pub fn begin(
+        log: &'a Log,
+        out: impl AsRef<Path>,
+        force: bool,
+        channels: &[NewChannel],
+        compression: Compression,
+    ) -> Result<Self, LogError> {
+        let out = out.as_ref();
+        log.ensure_appendable()?;
+        check_output(log, out, force)?;
+        let ids = assign_ids(log, channels)?;
+
+        let mut appender = Self {
+            log,
+            out: out.to_owned(),
+            force,
+            compression,
+            sink: Sink::copy(log, out)?,
+            channels: Vec::new(),
+            chunk: Chunk::default(),
+            summary: Vec::new(),
+            statistics: statistics_of(log.index()),
+            messages: 0,
+        };
+        // Before all chunks, so that each is readable on its own and a channel without messages is there.
+        for (channel, ids) in channels.iter().zip(ids) {
+            appender.define(channel, ids)?;
+        }
+        Ok(appender)
+    }
+
+    /// Adds a message. Chunks are cut as messages come, so those near in time should come together.
+    ///
+    /// # Errors
+    /// [`LogError::Write`].
+    ///
+    /// # Panics
+    /// When `message.channel` is none of the channels given at the start.
+    pub fn write(&mut self, message: NewMessage<'_>) -> Result<(), LogError> {
+        let (channel_id, sequence) = &mut self.channels[message.channel];
+        let header = MessageHeader {
+            channel_id: *channel_id,
+            sequence: *sequence,
+            log_time: message.time_ns,
+            publish_time: message.time_ns,
+        };
+        *sequence = sequence.wrapping_add(1);
+        let record = encode_bytes(op::MESSAGE, &[&encode_body(&header), message.data]);
+        if !self.chunk.has_room(message.time_ns, record.len()) {
+            self.end_chunk()?;
+        }
+        self.chunk.push(&header, &record);
+        count(&mut self.statistics, &header);
+        self.messages += 1;
+        Ok(())
+    }
+
+    /// Adds a metadata record.
+    ///
+    /// # Errors
+    /// [`LogError::Write`].
+    pub fn write_metadata(&mut self, metadata: &NewMetadata) -> Result<(), LogError> {
+        let NewMetadata { name, entries } = metadata.clone();
+        let record = encode(op::METADATA, &mcap::records::Metadata { name: name.clone(), metadata: entries });
+        let entry = MetadataIndex { offset: self.sink.position, length: record.len() as u64, name };
+        self.put(&record)?;
+        self.summarize(op::METADATA_INDEX, encode(op::METADATA_INDEX, &entry));
+        self.statistics.metadata_count += 1;
+        Ok(())
+    }
+
+    /// Writes the rest, waits until all of it is on the disk, and gives the output its name.
+    ///
+    /// # Errors
+    /// [`LogError::Write`]; [`LogError::OutputExists`] when somebody else made `out` meanwhile.
+    pub fn finish(mut self) -> Result<Written, LogError> {
+        self.end_chunk()?;
+        let end = DataEnd { data_section_crc: self.sink.data_crc() };
+        self.put(&encode(op::DATA_END, &end))?;
+        let tail = summary::tail(self.log.index(), &self.summary, &self.statistics, self.sink.position);
+        self.put(&tail)?;
+        let Self { out, force, sink, messages, .. } = self;
+        let len = sink.position;
+        match sink.publish(&out, force) {
+            Ok(()) => Ok(Written { path: out, len, messages }),
+            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => Err(LogError::OutputExists { path: out }),
+            Err(source) => Err(LogError::Write { path: out, source }),
+        }
+    }
+
+    fn define(&mut self, channel: &NewChannel, ids: Ids) -> Result<(), LogError> {
+        if ids.schema_is_new {
+            let header = SchemaHeader {
+                id: ids.schema,
+                name: channel.schema_name.clone(),
+                encoding: channel.schema_encoding.clone(),
+            };
+            let len = (channel.schema.len() as u32).to_le_bytes();
+            let record = encode_bytes(op::SCHEMA, &[&encode_body(&header), &len, &channel.schema]);
+            self.put(&record)?;
+            self.summarize(op::SCHEMA, record);
+            self.statistics.schema_count = self.statistics.schema_count.saturating_add(1);
+        }
+        let record = encode(
+            op::CHANNEL,
+            &Channel {
+                id: ids.channel,
+                schema_id: ids.schema,
+                topic: channel.topic.clone(),
+                message_encoding: channel.message_encoding.clone(),
+                metadata: channel.metadata.clone(),
+            },
+        );
+        self.put(&record)?;
+        self.summarize(op::CHANNEL, record);
+        self.statistics.channel_count += 1;
+        self.channels.push((ids.channel, 0));
+        Ok(())
+    }
+
+    fn end_chunk(&mut self) -> Result<(), LogError> {
+        let chunk = std::mem::take(&mut self.chunk);
+        if chunk.records.is_empty() {
+            return Ok(());
+        }
+        let compressed = self.compression.compress(&chunk.records).map_err(|e| self.cannot_write(e))?;
+        let header = ChunkHeader {
+            message_start_time: chunk.start,
+            message_end_time: chunk.end,
+            uncompressed_size: chunk.records.len() as u64,
+            uncompressed_crc: crc32fast::hash(&chunk.records),
+            compression: self.compression.name().to_owned(),
+            compressed_size: compressed.len() as u64,
+        };
+        let chunk_start_offset = self.sink.position;
+        self.put(&encode_bytes(op::CHUNK, &[&encode_body(&header), &compressed]))?;
+        let chunk_end = self.sink.position;
+        let mut message_index_offsets = BTreeMap::new();
+        for (channel_id, mut records) in chunk.index {
+            records.sort_by_key(|entry| entry.log_time);
+            message_index_offsets.insert(channel_id, self.sink.position);
+            self.put(&encode(op::MESSAGE_INDEX, &MessageIndex { channel_id, records }))?;
+        }
+        let entry = ChunkIndex {
+            message_start_time: chunk.start,
+            message_end_time: chunk.end,
+            chunk_start_offset,
+            chunk_length: chunk_end - chunk_start_offset,
+            message_index_offsets,
+            message_index_length: self.sink.position - chunk_end,
+            compression: header.compression,
+            compressed_size: header.compressed_size,
+            uncompressed_size: header.uncompressed_size,
+        };
+        self.summarize(op::CHUNK_INDEX, encode(op::CHUNK_INDEX, &entry));
+        self.statistics.chunk_count += 1;
+        Ok(())
+    }
+
+    fn summarize(&mut self, opcode: u8, bytes: Vec<u8>) {
+        self.summary.push(SummaryRecord { opcode, bytes });
+    }
+
+    fn put(&mut self, bytes: &[u8]) -> Result<(), LogError> {
+        self.sink.put(bytes).map_err(|e| self.cannot_write(e))
+    }
+
+    fn cannot_write(&self, source: io::Error) -> LogError {
+        LogError::Write { path: self.out.clone(), source }
+    }
+}
+
+/// The log's statistics, with counts that aren't below what is there: some writers count only what
+/// has messages.
+fn statistics_of(index: &Index) -> Statistics {
+    let mut statistics = index.statistics.clone().unwrap_or_default();
+    statistics.schema_count = statistics.schema_count.max(index.schemas.len() as u16);
+    statistics.channel_count = statistics.channel_count.max(index.channels.len() as u32);
+    statistics.attachment_count = index.attachments.len() as u32;
+    statistics.metadata_count = index.metadata.len() as u32;
+    statistics.chunk_count = index.chunks.len() as u32;
+    statistics
+}
+
+/// The messages of the chunk that is being filled.
+#[derive(Debug, Default)]
+struct Chunk {
+    records: Vec<u8>,
+    index: BTreeMap<u16, Vec<MessageIndexEntry>>,
+    start: u64,
+    end: u64,
+}
+
+impl Chunk {
+    fn has_room(&self, time: u64, len: usize) -> bool {
+        self.records.is_empty()
+            || self.records.len() + len <= CHUNK_BYTES
+                && self.end.max(time) - self.start.min(time) <= CHUNK_NS
+    }
+
+    fn push(&mut self, header: &MessageHeader, record: &[u8]) {
+        let time = header.log_time;
+        (self.start, self.end) =
+            if self.records.is_empty() { (time, time) } else { (self.start.min(time), self.end.max(time)) };
+        let entry = MessageIndexEntry { log_time: time, offset: self.records.len() as u64 };
+        self.index.entry(header.channel_id).or_default().push(entry);
+        self.records.extend_from_slice(record);
+    }
+}

@@ -1,0 +1,162 @@
+//! The records of a chunk, decompressed and checked.
+
+use std::io::{BufReader, Read};
+use std::ops::Range;
+
+use mcap::records::{ChunkHeader, ChunkIndex, op};
+
+use super::file::{HEAD_LEN, LogFile, MEMORY_LIMIT, split_head};
+use super::{Index, LogError};
+
+/// Start, end, size, CRC, the name's length and the compressed size: a chunk's header without the name.
+const FIXED_HEADER_LEN: u64 = 8 + 8 + 8 + 4 + 4 + 8;
+/// Far beyond any compression's name.
+const LONGEST_HEADER: u64 = FIXED_HEADER_LEN + 256;
+
+/// A part of the data section that holds messages.
+#[derive(Clone, Debug)]
+pub(super) enum Block<'a> {
+    Chunk(&'a ChunkIndex),
+    /// Schemas, channels and messages outside chunks, some MB of them.
+    Loose(Range<u64>),
+}
+
+impl Block<'_> {
+    pub(super) fn offset(&self) -> u64 {
+        match self {
+            Self::Chunk(chunk) => chunk.chunk_start_offset,
+            Self::Loose(range) => range.start,
+        }
+    }
+
+    /// Whether a message of `channel` may be in it, as far as the index tells.
+    pub(super) fn may_hold(&self, channel: u16) -> bool {
+        match self {
+            Self::Chunk(chunk) => {
+                chunk.message_index_offsets.is_empty() || chunk.message_index_offsets.contains_key(&channel)
+            }
+            Self::Loose(_) => true,
+        }
+    }
+}
+
+/// All parts that hold messages, in file order.
+pub(super) fn blocks(index: &Index) -> Vec<Block<'_>> {
+    let chunks = index.chunks.iter().map(Block::Chunk);
+    let mut blocks: Vec<_> = chunks.chain(index.loose.iter().cloned().map(Block::Loose)).collect();
+    blocks.sort_by_key(Block::offset);
+    blocks
+}
+
+/// The header of the chunk at `offset` and where its compressed bytes stand.
+pub(super) fn read_header(
+    file: &LogFile,
+    offset: u64,
+    end: u64,
+) -> Result<(ChunkHeader, Range<u64>), LogError> {
+    let head = file.head(offset, end)?;
+    if head.opcode != op::CHUNK {
+        let what = format!("expected a chunk (opcode {:#04x}), found {:#04x}", op::CHUNK, head.opcode);
+        return Err(file.damaged(offset, what));
+    }
+    let bytes = file.bytes(head.body(), head.body_len.min(LONGEST_HEADER), "a chunk's header")?;
+    let header: ChunkHeader = file.parse(offset, "chunk", &bytes)?;
+    let start = head.body() + FIXED_HEADER_LEN + header.compression.len() as u64;
+    match start.checked_add(header.compressed_size) {
+        Some(data_end) if data_end <= head.end() => Ok((header, start..data_end)),
+        _ => {
+            let what = format!(
+                "the chunk claims {} compressed bytes, its record has {}",
+                header.compressed_size,
+                head.end() - start
+            );
+            Err(file.damaged(offset, what))
+        }
+    }
+}
+
+/// Puts the records of `block` into `buf`. A chunk's size and checksum are checked.
+pub(super) fn read_block(file: &LogFile, block: &Block<'_>, buf: &mut Vec<u8>) -> Result<(), LogError> {
+    let chunk = match block {
+        Block::Loose(range) => {
+            return file.read_into(range.start, range.end - range.start, "a run of records", buf);
+        }
+        Block::Chunk(chunk) => chunk,
+    };
+    let offset = chunk.chunk_start_offset;
+    let (header, data) = read_header(file, offset, offset.saturating_add(chunk.chunk_length).min(file.len))?;
+    let size = header.uncompressed_size;
+    if size > MEMORY_LIMIT {
+        return Err(file.too_large(offset, "the chunk", size));
+    }
+    let compressed = file.reader(data.start).take(data.end - data.start);
+    buf.clear();
+    // One byte more than claimed tells a chunk that holds more from one that is right.
+    let read = match header.compression.as_str() {
+        "" => compressed.take(size + 1).read_to_end(buf),
+        "zstd" => zstd::Decoder::with_buffer(BufReader::with_capacity(1 << 17, compressed))
+            .and_then(|decoder| decoder.take(size + 1).read_to_end(buf)),
+        "lz4" => lz4::Decoder::new(BufReader::with_capacity(1 << 17, compressed))
+            .and_then(|decoder| decoder.take(size + 1).read_to_end(buf)),
+        name => {
+            let (path, name) = (file.path.clone(), name.to_owned());
+            return Err(LogError::UnknownCompression { path, offset, name });
+        }
+    };
+    read.map_err(|e| file.damaged(offset, format!("the chunk can't be decompressed: {e}")))?;
+    if buf.len() as u64 != size {
+        let relation = if buf.len() as u64 > size { "more than" } else { "less than" };
+        return Err(file.damaged(offset, format!("the chunk holds {relation} the {size} bytes it claims")));
+    }
+    let found = crc32fast::hash(buf);
+    if header.uncompressed_crc != 0 && header.uncompressed_crc != found {
+        let what = format!("the chunk's CRC is {found:08x}, its header says {:08x}", header.uncompressed_crc);
+        return Err(file.damaged(offset, what));
+    }
+    Ok(())
+}
+
+/// One record of a block, whole and without its head.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Record<'a> {
+    pub(super) opcode: u8,
+    pub(super) body: &'a [u8],
+    pub(super) whole: &'a [u8],
+}
+
+/// The records of a block, or how many bytes of it remain that are none.
+pub(super) fn records(mut bytes: &[u8]) -> impl Iterator<Item = Result<Record<'_>, usize>> {
+    std::iter::from_fn(move || {
+        if bytes.is_empty() {
+            return None;
+        }
+        let record = split_head(bytes).and_then(|(opcode, len)| {
+            let whole = bytes.get(..usize::try_from(len.checked_add(HEAD_LEN)?).ok()?)?;
+            Some(Record { opcode, body: whole.get(HEAD_LEN as usize..)?, whole })
+        });
+        let Some(record) = record else {
+            return Some(Err(std::mem::take(&mut bytes).len()));
+        };
+        bytes = bytes.get(record.whole.len()..).unwrap_or_default();
+        Some(Ok(record))
+    })
+}
+
+/// Hands every record of `blocks` to `f`, one block in memory at a time.
+pub(super) fn for_each_record<'b, E: From<LogError>>(
+    file: &LogFile,
+    blocks: impl IntoIterator<Item = Block<'b>>,
+    mut f: impl FnMut(&Block<'b>, Record<'_>) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut buf = Vec::new();
+    for block in blocks {
+        read_block(file, &block, &mut buf)?;
+        for record in records(&buf) {
+            let record = record.map_err(|left| {
+                file.damaged(block.offset(), format!("the last {left} bytes of the chunk are no record"))
+            })?;
+            f(&block, record)?;
+        }
+    }
+    Ok(())
+}

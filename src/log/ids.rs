@@ -1,0 +1,47 @@
+//! Ids for new schemas and channels.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::{Log, LogError, NewChannel};
+
+/// The ids of a new channel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ids {
+    pub(super) schema: u16,
+    pub(super) schema_is_new: bool,
+    pub(super) channel: u16,
+}
+
+/// Ids that nothing in the log uses or refers to.
+pub(super) fn assign_ids(log: &Log, channels: &[NewChannel]) -> Result<Vec<Ids>, LogError> {
+    let index = log.index();
+    let exhausted = |kind| LogError::IdsExhausted { path: log.file.path.clone(), kind };
+    let mut topics: BTreeSet<&str> = index.channels.values().map(|channel| channel.topic.as_str()).collect();
+    let schema_ids = index.channels.values().map(|channel| channel.schema_id);
+    // 0 means "no schema" and is no schema's id; it is a channel's id like any other.
+    let mut free_schemas = free_ids(index.schemas.keys().copied().chain(schema_ids).collect(), 1);
+    let used = index.chunks.iter().flat_map(|chunk| chunk.message_index_offsets.keys());
+    let counted = index.statistics.iter().flat_map(|statistics| statistics.channel_message_counts.keys());
+    let mut free_channels = free_ids(index.channels.keys().chain(used).chain(counted).copied().collect(), 0);
+
+    let mut schemas = BTreeMap::new();
+    let mut assigned = Vec::new();
+    for channel in channels {
+        if !topics.insert(&channel.topic) {
+            return Err(LogError::TopicTaken { path: log.file.path.clone(), topic: channel.topic.clone() });
+        }
+        let key = (&channel.schema_name, &channel.schema_encoding, &channel.schema);
+        let known = schemas.get(&key).copied();
+        let schema = known.or_else(|| free_schemas.next()).ok_or_else(|| exhausted("schema"))?;
+        schemas.insert(key, schema);
+        let channel = free_channels.next().ok_or_else(|| exhausted("channel"))?;
+        assigned.push(Ids { schema, schema_is_new: known.is_none(), channel });
+    }
+    Ok(assigned)
+}
+
+/// Ids above all used ones, then those between them.
+fn free_ids(used: BTreeSet<u16>, lowest: u16) -> impl Iterator<Item = u16> {
+    let above = used.last().map_or(lowest, |&greatest| greatest.saturating_add(1).max(lowest));
+    (above..=u16::MAX).chain(lowest..above).filter(move |id| !used.contains(id))
+}

@@ -1,0 +1,290 @@
+//! What is in a log: from its summary, completed from the data section where the summary is not whole.
+
+use std::{collections::BTreeMap, ops::Range, path::Path};
+
+use mcap::records::{
+    AttachmentIndex, Channel, ChunkIndex, DataEnd, Footer, Header, MetadataIndex, SchemaHeader, Statistics,
+    op,
+};
+
+use super::file::{HEAD_LEN, Head, LogFile, MEMORY_LIMIT, parse};
+use super::{LogError, Obstacle, chunk, survey};
+
+const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
+const MAGIC_LEN: u64 = MAGIC.len() as u64;
+/// Summary start, summary offset start, CRC.
+const FOOTER_BODY_LEN: u64 = 8 + 8 + 4;
+const DATA_END_BODY_LEN: u64 = 4;
+/// DataEnd with its head, right before the summary.
+const DATA_END_LEN: u64 = HEAD_LEN + DATA_END_BODY_LEN;
+
+/// How a channel's messages are made up.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Schema {
+    /// The id that channels name it by.
+    pub id: u16,
+    /// Such as `nav_msgs/msg/Odometry`.
+    pub name: String,
+    /// Such as `ros2msg` or `jsonschema`.
+    pub encoding: String,
+    /// The definition itself.
+    pub data: Vec<u8>,
+}
+
+impl Schema {
+    pub(super) fn parse(body: &[u8]) -> Result<Self, String> {
+        let header: SchemaHeader = parse(body)?;
+        // Id, and two strings with their lengths; then the length of the data.
+        let start = 2 + 4 + header.name.len() + 4 + header.encoding.len();
+        let rest = body.get(start..).unwrap_or_default();
+        let (len, rest) = rest.split_first_chunk::<4>().ok_or("its data has no length")?;
+        let len = u32::from_le_bytes(*len);
+        let data = rest
+            .get(..len as usize)
+            .ok_or_else(|| format!("its data claims {len} bytes, it has {}", rest.len()))?;
+        Ok(Self { id: header.id, name: header.name, encoding: header.encoding, data: data.to_vec() })
+    }
+}
+
+/// A record of the summary, with every byte that its writer gave it.
+#[derive(Clone, Debug)]
+pub(super) struct SummaryRecord {
+    pub(super) opcode: u8,
+    pub(super) bytes: Vec<u8>,
+}
+
+/// What is in a log, without its messages.
+#[derive(Clone, Debug, Default)]
+pub struct Index {
+    /// What the header calls the log's profile, such as `ros2`.
+    pub profile: String,
+    /// What the header says wrote the log.
+    pub library: String,
+    /// By id.
+    pub schemas: BTreeMap<u16, Schema>,
+    /// By id; channels without messages too.
+    pub channels: BTreeMap<u16, Channel>,
+    /// In file order.
+    pub chunks: Vec<ChunkIndex>,
+    /// In file order.
+    pub attachments: Vec<AttachmentIndex>,
+    /// In file order.
+    pub metadata: Vec<MetadataIndex>,
+    /// Counts and times, of the summary or counted; `None` only where a scan was not possible.
+    pub statistics: Option<Statistics>,
+    /// Where the first record after the header stands.
+    pub data_start: u64,
+    /// Where the DataEnd record stands: the bytes before it never change.
+    pub data_end: u64,
+    /// Where the summary begins, `None` where there is none.
+    pub summary_start: Option<u64>,
+    /// CRC-32 of the bytes before DataEnd, `None` where the writer left it out.
+    pub data_section_crc: Option<u32>,
+    /// CRC-32 of the summary, `None` where the writer left it out.
+    pub summary_crc: Option<u32>,
+    /// Length of the file in bytes.
+    pub file_len: u64,
+    /// The summary's records as they stand, but for summary offsets; what was missing comes behind them.
+    pub(super) summary: Vec<SummaryRecord>,
+    /// Runs of schemas, channels and messages outside chunks, in pieces of some MB.
+    pub(super) loose: Vec<Range<u64>>,
+}
+
+impl Index {
+    /// The schema of a channel, `None` where it has none.
+    #[must_use]
+    pub fn schema_of(&self, channel: &Channel) -> Option<&Schema> {
+        self.schemas.get(&channel.schema_id)
+    }
+
+    /// Channels of a topic: several where a log was merged, or its writer restarted.
+    pub fn channels_of<'a>(&'a self, topic: &'a str) -> impl Iterator<Item = &'a Channel> {
+        self.channels.values().filter(move |channel| channel.topic == topic)
+    }
+
+    /// Puts one record of the summary into the index.
+    pub(super) fn insert(&mut self, opcode: u8, body: &[u8]) -> Result<(), String> {
+        match opcode {
+            op::SCHEMA => {
+                let schema = Schema::parse(body)?;
+                self.schemas.entry(schema.id).or_insert(schema);
+            }
+            op::CHANNEL => {
+                let channel: Channel = parse(body)?;
+                self.channels.entry(channel.id).or_insert(channel);
+            }
+            op::STATISTICS => self.statistics = Some(parse(body)?),
+            op::CHUNK_INDEX => self.chunks.push(parse(body)?),
+            op::ATTACHMENT_INDEX => self.attachments.push(parse(body)?),
+            op::METADATA_INDEX => self.metadata.push(parse(body)?),
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+/// A recording, open for reading.
+#[derive(Debug)]
+pub struct Log {
+    pub(super) file: LogFile,
+    index: Index,
+    obstacle: Option<Obstacle>,
+}
+
+impl Log {
+    /// Opens a log and reads what is in it.
+    ///
+    /// Takes time by the number of chunks, not by their size, unless the summary leaves out
+    /// channels, schemas or statistics: then every chunk is read once.
+    ///
+    /// # Errors
+    /// [`LogError::Open`], [`LogError::NotMcap`], [`LogError::CutOff`] when the end is missing,
+    /// [`LogError::Damaged`] when the summary contradicts itself or the data section.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, LogError> {
+        let file = LogFile::open(path.as_ref())?;
+        let mut index = read_summary(&file)?;
+        let obstacle = survey::complete(&file, &mut index)?;
+        Ok(Self { file, index, obstacle })
+    }
+
+    /// What is in the log.
+    #[must_use]
+    pub fn index(&self) -> &Index {
+        &self.index
+    }
+
+    /// Where the log is.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.file.path
+    }
+
+    /// Whether channels can be added without hiding old messages from indexed readers.
+    ///
+    /// # Errors
+    /// [`LogError::NotAppendable`] with the first obstacle.
+    pub fn ensure_appendable(&self) -> Result<(), LogError> {
+        match self.obstacle {
+            None => Ok(()),
+            Some(obstacle) => Err(LogError::NotAppendable { path: self.file.path.clone(), obstacle }),
+        }
+    }
+
+    /// The parts of the log that hold messages, in file order.
+    pub(super) fn blocks(&self) -> Vec<chunk::Block<'_>> {
+        chunk::blocks(&self.index)
+    }
+}
+
+/// Both ends of the file, and the summary between them.
+fn read_summary(file: &LogFile) -> Result<Index, LogError> {
+    let data_start = check_magic(file)?;
+    let cut_off = |what| LogError::CutOff { path: file.path.clone(), what, len: file.len };
+
+    let footer_start = file.len.saturating_sub(MAGIC_LEN + HEAD_LEN + FOOTER_BODY_LEN);
+    if footer_start < data_start.end() + DATA_END_LEN {
+        return Err(cut_off("it has no footer"));
+    }
+    if file.bytes(file.len - MAGIC_LEN, MAGIC_LEN, "the magic at the end")? != MAGIC {
+        return Err(cut_off("the magic at its end is missing"));
+    }
+    let footer_head = file.head(footer_start, file.len - MAGIC_LEN)?;
+    if (footer_head.opcode, footer_head.body_len) != (op::FOOTER, FOOTER_BODY_LEN) {
+        return Err(file.damaged(footer_start, "expected the footer"));
+    }
+    let footer: Footer = read_record(file, footer_head, "footer")?;
+
+    // Without a summary, DataEnd stands before what follows in its place.
+    let starts = [footer.summary_start, footer.summary_offset_start, footer_start];
+    let tail_start = starts.into_iter().find(|&start| start != 0).unwrap_or(footer_start);
+    let records_end =
+        if footer.summary_offset_start == 0 { footer_start } else { footer.summary_offset_start };
+    if tail_start < data_start.end() + DATA_END_LEN || tail_start > records_end || records_end > footer_start
+    {
+        let what = format!("the footer's summary [{tail_start}, {records_end}) is not before the footer");
+        return Err(file.damaged(footer_start, what));
+    }
+    let data_end = file.head(tail_start - DATA_END_LEN, tail_start)?;
+    if (data_end.opcode, data_end.body_len) != (op::DATA_END, DATA_END_BODY_LEN) {
+        return Err(file.damaged(data_end.offset, "expected the end of the data section before the summary"));
+    }
+    let crc: DataEnd = read_record(file, data_end, "data end")?;
+
+    // The CRC spans the summary and the footer up to the CRC itself.
+    let tail_len = file.len - MAGIC_LEN - 4 - tail_start;
+    let tail = file.bytes(tail_start, tail_len, "the summary")?;
+    let found = crc32fast::hash(&tail);
+    if footer.summary_crc != 0 && footer.summary_crc != found {
+        let what = format!("the summary's CRC is {found:08x}, the footer says {:08x}", footer.summary_crc);
+        return Err(file.damaged(tail_start, what));
+    }
+
+    let header: Header = read_record(file, data_start, "header")?;
+    let mut index = Index {
+        profile: header.profile,
+        library: header.library,
+        data_start: data_start.end(),
+        data_end: data_end.offset,
+        summary_start: Some(footer.summary_start).filter(|&start| start != 0),
+        data_section_crc: Some(crc.data_section_crc).filter(|&crc| crc != 0),
+        summary_crc: Some(footer.summary_crc).filter(|&crc| crc != 0),
+        file_len: file.len,
+        ..Index::default()
+    };
+    if footer.summary_start == 0 {
+        return Ok(index);
+    }
+    let records = tail.get(..(records_end - tail_start) as usize).unwrap_or_default();
+    let mut offset = tail_start;
+    for record in chunk::records(records) {
+        let record = record.map_err(|left| {
+            file.damaged(offset, format!("the last {left} bytes of the summary are no record"))
+        })?;
+        let bad = |problem| {
+            file.damaged(offset, format!("summary record (opcode {:#04x}): {problem}", record.opcode))
+        };
+        index.insert(record.opcode, record.body).map_err(bad)?;
+        if record.opcode != op::SUMMARY_OFFSET {
+            index.summary.push(SummaryRecord { opcode: record.opcode, bytes: record.whole.to_vec() });
+        }
+        offset += record.whole.len() as u64;
+    }
+    Ok(index)
+}
+
+/// The header record, behind the magic.
+fn check_magic(file: &LogFile) -> Result<Head, LogError> {
+    let start = file.bytes(0, file.len.min(MAGIC_LEN), "the magic at the start")?;
+    let not_mcap = |found: String| Err(LogError::NotMcap { path: file.path.clone(), found });
+    if start.is_empty() {
+        return not_mcap("the file is empty".to_owned());
+    }
+    if start != MAGIC {
+        if MAGIC.starts_with(&start) {
+            let what = "it ends within the magic at its start";
+            return Err(LogError::CutOff { path: file.path.clone(), what, len: file.len });
+        }
+        let text = start.escape_ascii();
+        return not_mcap(format!("it starts with \"{text}\", expected \"{}\"", MAGIC.escape_ascii()));
+    }
+    let cut_off = || LogError::CutOff { path: file.path.clone(), what: "it has no header", len: file.len };
+    if file.len < MAGIC_LEN + HEAD_LEN {
+        return Err(cut_off());
+    }
+    let head = file.head(MAGIC_LEN, file.len)?;
+    if head.opcode != op::HEADER {
+        return Err(
+            file.damaged(MAGIC_LEN, format!("expected the header, found opcode {:#04x}", head.opcode))
+        );
+    }
+    Ok(head)
+}
+
+/// A record of the file, whole in memory: only for small ones.
+pub(super) fn read_record<T>(file: &LogFile, head: Head, what: &'static str) -> Result<T, LogError>
+where
+    T: for<'a> binrw::BinRead<Args<'a> = ()>,
+{
+    debug_assert!(head.body_len <= MEMORY_LIMIT);
+    file.parse(head.offset, what, &file.bytes(head.body(), head.body_len, what)?)
+}

@@ -1,0 +1,108 @@
+//! The output on the disk: a nameless file beside it until all is written.
+
+use std::{
+    fs::{self, File},
+    io::{self, BufWriter, Read, Seek, Write},
+    path::Path,
+};
+
+use tempfile::NamedTempFile;
+
+use super::{Log, LogError};
+
+/// The output while it has no name, and what must be known about the bytes in it.
+#[derive(Debug)]
+pub(super) struct Sink {
+    file: BufWriter<NamedTempFile>,
+    pub(super) position: u64,
+    /// `None` where the log has no data section CRC to continue.
+    crc: Option<crc32fast::Hasher>,
+}
+
+impl Sink {
+    /// The log's data section in a new file beside `out`.
+    pub(super) fn copy(log: &Log, out: &Path) -> Result<Self, LogError> {
+        let index = log.index();
+        let written = |source| LogError::Write { path: out.to_owned(), source };
+        let mut file = temporary_beside(out).map_err(written)?;
+        let mut source = &log.file.file;
+        // Both are plain files, so that the kernel copies, and shares blocks where it can.
+        let copied = source
+            .rewind()
+            .and_then(|()| io::copy(&mut source.take(index.data_end), file.as_file_mut()))
+            .map_err(written)?;
+        if copied != index.data_end {
+            let what =
+                format!("only {copied} bytes of the data section are left, expected {}", index.data_end);
+            return Err(log.file.damaged(copied, what));
+        }
+        let crc = index.data_section_crc.map(crc32fast::Hasher::new_with_initial);
+        Ok(Self { file: BufWriter::new(file), position: copied, crc })
+    }
+
+    pub(super) fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.file.write_all(bytes)?;
+        self.position += bytes.len() as u64;
+        if let Some(crc) = &mut self.crc {
+            crc.update(bytes);
+        }
+        Ok(())
+    }
+
+    /// CRC of all that was put so far, 0 for none.
+    pub(super) fn data_crc(&self) -> u32 {
+        self.crc.clone().map_or(0, crc32fast::Hasher::finalize)
+    }
+
+    pub(super) fn publish(self, out: &Path, force: bool) -> io::Result<()> {
+        let file = self.file.into_inner().map_err(io::IntoInnerError::into_error)?;
+        file.as_file().sync_all()?;
+        let named = if force { file.persist(out) } else { file.persist_noclobber(out) };
+        named.map_err(|e| e.error)?;
+        #[cfg(unix)]
+        File::open(directory(out))?.sync_all()?;
+        Ok(())
+    }
+}
+
+fn directory(out: &Path) -> &Path {
+    out.parent().filter(|dir| !dir.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+fn temporary_beside(out: &Path) -> io::Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".trackfuse-").suffix(".part");
+    // As any new file, less the user's umask; temporary files are private otherwise.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(directory(out))
+}
+
+/// Refuses an output before any work is done for it.
+pub(super) fn check_output(log: &Log, out: &Path, force: bool) -> Result<(), LogError> {
+    let path = || out.to_owned();
+    if is_same_file(&log.file.file, &log.file.path, out) {
+        return Err(LogError::OutputIsInput { path: path() });
+    }
+    match fs::symlink_metadata(out) {
+        Ok(_) if !force => Err(LogError::OutputExists { path: path() }),
+        Ok(found) if found.is_dir() => {
+            Err(LogError::Write { path: path(), source: io::ErrorKind::IsADirectory.into() })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Whether `out` leads to the open file `input`, by whatever link.
+#[cfg(unix)]
+fn is_same_file(input: &File, _: &Path, out: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let id = |metadata: &fs::Metadata| (metadata.dev(), metadata.ino());
+    matches!((input.metadata(), fs::metadata(out)), (Ok(a), Ok(b)) if id(&a) == id(&b))
+}
+
+/// Whether `out` leads to the file at `input`, by its path.
+#[cfg(not(unix))]
+fn is_same_file(_: &File, input: &Path, out: &Path) -> bool {
+    matches!((input.canonicalize(), out.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
