@@ -6,6 +6,8 @@ pub mod estimate;
 pub mod fusion;
 pub mod log;
 pub mod math;
+pub mod publish;
 pub mod sample;
+pub mod source;
 pub mod time;
 pub mod track;

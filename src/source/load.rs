@@ -1,0 +1,340 @@
+//! From the messages of the chosen channels to samples in order of time.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::reading::{Clock, Fault, Outcome, Reader, Reading};
+use super::{SourceError, recognise};
+use crate::config::SourceConfig;
+use crate::estimate::noise;
+use crate::log::Log;
+use crate::log::decode::MessagePath;
+use crate::math::robust;
+use crate::sample::{Quantity, Sample, Source};
+use crate::time::Time;
+
+/// Where a sigma comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SigmaOrigin {
+    /// The config.
+    Config,
+    /// The covariances in the messages.
+    Messages,
+    /// The scatter of the samples.
+    Estimated,
+    /// Too few samples to tell: 1 m or 1 m/s.
+    Assumed,
+}
+
+impl SigmaOrigin {
+    /// In words.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Config => "config",
+            Self::Messages => "messages",
+            Self::Estimated => "estimated",
+            Self::Assumed => "assumed",
+        }
+    }
+}
+
+/// Which clock a source's samples are on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Timing {
+    /// `stamp`, `publish` or `log`, or several with `+`.
+    pub clock: String,
+    /// Median of log time less the sample's time, s.
+    pub delay_s: f64,
+    /// Half the width of its middle 68 %, s.
+    pub delay_spread_s: f64,
+}
+
+/// A source with what is to be said of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Loaded {
+    /// The paths and choices that were used.
+    pub config: SourceConfig,
+    /// The samples.
+    pub source: Source,
+    /// The frame that its messages name first; empty where they don't.
+    pub frame_id: String,
+    /// Its clock.
+    pub timing: Timing,
+    /// Median standard deviation over axes and samples, m and m/s, and where it comes from.
+    pub sigma: [Option<(f64, SigmaOrigin)>; 2],
+    /// What a person must read, a sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// A stamp that lies this much before its predecessor is worth a warning.
+const BACKWARD_S: f64 = 1.0;
+
+/// Readings of one source as they come.
+struct Gathered<'a> {
+    config: &'a SourceConfig,
+    paths: Vec<(Quantity, MessagePath)>,
+    readings: [Vec<Reading>; 2],
+    delays_s: Vec<f64>,
+    clocks: [usize; 3],
+    frame_id: Option<String>,
+    messages: usize,
+    undecodable: Option<(usize, crate::log::decode::DecodeError)>,
+    faults: BTreeMap<&'static str, usize>,
+    first_fault: [Option<Fault>; 2],
+    farthest_back_s: f64,
+    untimed: usize,
+}
+
+/// Loads `configs` in one pass over the log; the origin of the samples' seconds is the median time of the
+/// [`datum`]'s.
+///
+/// # Errors
+/// [`SourceError`] for a path or topic that doesn't fit, and for a source without a single sample.
+pub fn load(log: &Log, configs: &[SourceConfig]) -> Result<(Vec<Loaded>, Time), SourceError> {
+    let mut gathered = configs.iter().map(Gathered::new).collect::<Result<Vec<_>, _>>()?;
+    let index = log.index();
+    let mut readers: BTreeMap<u16, Vec<(usize, Reader)>> = BTreeMap::new();
+    for (i, source) in gathered.iter().enumerate() {
+        let topics: BTreeSet<&str> = source.paths.iter().map(|(_, p)| p.topic.as_str()).collect();
+        for topic in topics {
+            let mut channels = index.channels_of(topic).peekable();
+            if channels.peek().is_none() {
+                return Err(SourceError::NoTopic {
+                    name: source.config.name.clone(),
+                    topic: topic.to_owned(),
+                    topics: index.channels.values().map(|c| c.topic.clone()).collect::<BTreeSet<_>>().into_iter().collect(),
+                });
+            }
+            for channel in channels {
+                let reader = Reader::new(source.config, &source.paths, index, channel)?;
+                readers.entry(channel.id).or_default().push((i, reader));
+            }
+        }
+    }
+    let wanted: BTreeSet<u16> = readers.keys().copied().collect();
+    log.for_each_message(&wanted, |message| {
+        for (i, reader) in readers.get(&message.channel_id).into_iter().flatten() {
+            gathered[*i].messages += 1;
+            match reader.read(&message) {
+                Ok(Some(outcome)) => gathered[*i].add(outcome),
+                Ok(None) => gathered[*i].untimed += 1,
+                Err(error) => gathered[*i].undecodable.get_or_insert((0, error)).0 += 1,
+            }
+        }
+        Ok::<(), SourceError>(())
+    })?;
+    for source in &mut gathered {
+        source.check()?;
+    }
+    let origin = gathered.get(datum(configs)).map_or(Time::from_ns(0), Gathered::median_time);
+    Ok((gathered.into_iter().map(|g| g.finish(origin)).collect(), origin))
+}
+
+impl<'a> Gathered<'a> {
+    fn new(config: &'a SourceConfig) -> Result<Self, SourceError> {
+        let given = [(Quantity::Position, &config.position), (Quantity::Velocity, &config.velocity)];
+        let parse = |(quantity, text): (Quantity, &Option<String>)| {
+            let text = text.as_ref()?;
+            let path = MessagePath::parse(text);
+            Some(path.map(|p| (quantity, p)).map_err(|error| SourceError::Path { name: config.name.clone(), error }))
+        };
+        Ok(Self {
+            config,
+            paths: given.into_iter().filter_map(parse).collect::<Result<_, _>>()?,
+            readings: [Vec::new(), Vec::new()],
+            delays_s: Vec::new(),
+            clocks: [0; 3],
+            frame_id: None,
+            messages: 0,
+            undecodable: None,
+            faults: BTreeMap::new(),
+            first_fault: [None, None],
+            farthest_back_s: 0.0,
+            untimed: 0,
+        })
+    }
+
+    fn add(&mut self, outcome: Outcome) {
+        self.clocks[match outcome.clock {
+            Clock::Stamp => 0,
+            Clock::Publish => 1,
+            Clock::Log => 2,
+        }] += 1;
+        self.delays_s.push(outcome.delay_s);
+        if self.frame_id.is_none() {
+            self.frame_id = outcome.frame_id;
+        }
+        for (quantity, result) in outcome.vectors {
+            let q = quantity as usize;
+            match result {
+                Ok(reading) => {
+                    if let Some(last) = self.readings[q].last() {
+                        let back = last.time.seconds_since(reading.time);
+                        self.farthest_back_s = self.farthest_back_s.max(back);
+                    }
+                    self.readings[q].push(reading);
+                }
+                Err(fault) => {
+                    if let Some(what) = fault.description() {
+                        *self.faults.entry(what).or_default() += 1;
+                        self.first_fault[q].get_or_insert(fault);
+                    }
+                }
+            }
+        }
+    }
+
+    /// An error where a path gave nothing at all.
+    fn check(&mut self) -> Result<(), SourceError> {
+        let name = self.config.name.clone();
+        if let Some((count, _)) = self.undecodable
+            && count == self.messages
+            && let Some((_, error)) = self.undecodable.take()
+        {
+            let topic = self.paths.first().map_or(String::new(), |(_, p)| p.topic.clone());
+            return Err(SourceError::Decode { name, topic, error });
+        }
+        for (quantity, path) in &self.paths {
+            let q = *quantity as usize;
+            if !self.readings[q].is_empty() {
+                continue;
+            }
+            let found = match self.first_fault[q].take() {
+                Some(Fault::Miss(miss)) => return Err(SourceError::Miss { name, miss }),
+                Some(Fault::NoVector(kind)) => kind.to_owned(),
+                Some(fault) => fault.description().unwrap_or_default().to_owned(),
+                None => {
+                    let topics = vec![path.topic.clone()];
+                    return Err(SourceError::Empty { name, topics });
+                }
+            };
+            return Err(SourceError::NoVector { name, path: path.to_string(), found, count: self.messages });
+        }
+        Ok(())
+    }
+
+    fn median_time(&self) -> Time {
+        let mut times: Vec<Time> = self.readings.iter().flatten().map(|r| r.time).collect();
+        let middle = times.len() / 2;
+        if times.is_empty() { Time::from_ns(0) } else { *times.select_nth_unstable(middle).1 }
+    }
+
+    fn finish(mut self, origin: Time) -> Loaded {
+        let warnings = self.warnings();
+        let mut source = Source { name: self.config.name.clone(), ..Source::default() };
+        let mut sigma = [None, None];
+        for quantity in Quantity::ALL {
+            let readings = std::mem::take(&mut self.readings[quantity as usize]);
+            let configured = match quantity {
+                Quantity::Position => self.config.position_sigma_m,
+                Quantity::Velocity => self.config.velocity_sigma_m_s,
+            };
+            (*source.series_mut(quantity), sigma[quantity as usize]) = samples(readings, origin, configured);
+        }
+        let names = ["stamp", "publish", "log"];
+        let used: Vec<&str> = names.iter().zip(self.clocks).filter(|(_, n)| *n > 0).map(|(name, _)| *name).collect();
+        let quantile = |delays: &mut Vec<f64>, share| robust::quantile(delays, share).unwrap_or(0.0);
+        let timing = Timing {
+            clock: used.join("+"),
+            delay_s: quantile(&mut self.delays_s, 0.5),
+            delay_spread_s: 0.5 * (quantile(&mut self.delays_s, 0.84) - quantile(&mut self.delays_s, 0.16)),
+        };
+        Loaded {
+            config: self.config.clone(),
+            source,
+            frame_id: self.frame_id.unwrap_or_default(),
+            timing,
+            sigma,
+            warnings,
+        }
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let name = &self.config.name;
+        let mut warnings = Vec::new();
+        if let Some((count, error)) = &self.undecodable {
+            warnings.push(format!("{name}: {count} of {} messages can't be decoded: {error}", self.messages));
+        }
+        for (what, count) in &self.faults {
+            warnings.push(format!("{name}: {count} samples are left out: {what}"));
+        }
+        if self.untimed > 0 {
+            warnings.push(format!("{name}: {} messages are left out: they have no usable time", self.untimed));
+        }
+        if self.clocks.iter().filter(|n| **n > 0).count() > 1 {
+            let [stamp, publish, log] = self.clocks;
+            warnings.push(format!(
+                "{name}: {stamp} samples are timed by stamp, {publish} by publish time, {log} by log time: set \
+                 `time` for this source"
+            ));
+        }
+        if self.farthest_back_s > BACKWARD_S {
+            warnings.push(format!("{name}: times go back by up to {:.1} s from one message to the next", self.farthest_back_s));
+        }
+        warnings
+    }
+}
+
+impl Fault {
+    /// What is wrong; `None` where nothing is.
+    fn description(&self) -> Option<&'static str> {
+        match self {
+            Self::Miss(_) => Some("the path leads nowhere in them"),
+            Self::NoVector(_) => Some("no vector at the path"),
+            Self::NotFinite => Some("NaN or infinite"),
+            Self::NoOrientation => Some("no orientation of unit length to turn the velocity by"),
+            Self::Filtered => None,
+        }
+    }
+}
+
+type Sigma = Option<(f64, SigmaOrigin)>;
+
+/// Readings in order of time with a sigma each, and the median sigma with its origin.
+fn samples(mut readings: Vec<Reading>, origin: Time, configured: Option<f64>) -> (Vec<Sample>, Sigma) {
+    readings.sort_by_key(|r| r.time);
+    let from_messages = readings.iter().any(|r| r.sigma.is_some());
+    let mut samples: Vec<Sample> = readings
+        .iter()
+        .map(|r| Sample {
+            time_s: r.time.seconds_since(origin),
+            value: r.value,
+            sigma: configured.map_or(r.sigma.unwrap_or([f64::NAN; 3]), |s| [s; 3]),
+        })
+        .collect();
+    if samples.is_empty() {
+        return (samples, None);
+    }
+    let origin = match (configured, from_messages) {
+        (Some(_), _) => SigmaOrigin::Config,
+        (None, true) => {
+            // messages without one take the median of the others
+            let mut known: Vec<f64> = readings.iter().filter_map(|r| r.sigma).flatten().collect();
+            let median = robust::median(&mut known).unwrap_or(1.0);
+            for sample in samples.iter_mut().filter(|s| s.sigma[0].is_nan()) {
+                sample.sigma = [median; 3];
+            }
+            SigmaOrigin::Messages
+        }
+        (None, false) => {
+            let estimated = noise::estimate_sigma(&samples);
+            samples.iter_mut().for_each(|s| s.sigma = [estimated.unwrap_or(1.0); 3]);
+            if estimated.is_some() { SigmaOrigin::Estimated } else { SigmaOrigin::Assumed }
+        }
+    };
+    let mut all: Vec<f64> = samples.iter().flat_map(|s| s.sigma).collect();
+    let median = robust::median(&mut all).map(|m| (m, origin));
+    (samples, median)
+}
+
+/// The datum among `configs`: the one marked, else the one that its name or topic says, else the first.
+#[must_use]
+pub fn datum(configs: &[SourceConfig]) -> usize {
+    let says = |c: &SourceConfig| {
+        [Some(&c.name), c.position.as_ref(), c.velocity.as_ref()]
+            .into_iter()
+            .flatten()
+            .any(|text| recognise::is_datum_like(text))
+    };
+    configs.iter().position(|c| c.datum).or_else(|| configs.iter().position(says)).unwrap_or(0)
+}
