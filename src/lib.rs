@@ -1,4 +1,5 @@
 //! `trackfuse`
 #![forbid(unsafe_code)]
 
+pub mod simulate;
 pub mod time;
