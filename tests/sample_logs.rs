@@ -1,5 +1,7 @@
 //! The stored sample logs are what their scenarios make. `TRACKFUSE_UPDATE_SAMPLES=1` writes them anew.
 
+#![allow(clippy::unwrap_used)]
+
 use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};

@@ -6,8 +6,8 @@
 //! n(t) = rms sqrt(2/N) sum_k cos(2 pi f_k t + phi_k),   phi_k ~ U(0, 2 pi)
 //! ```
 //!
-//! is smooth, has the given rms on the long run, nothing outside of the band, and is a function of time alone.
-//! It is nearly Gaussian, as each value is a sum of N terms of the same size.
+//! is smooth, has the given rms on the long run, nothing outside of the band, and is a function of time
+//! alone. It is nearly Gaussian, as each value is a sum of N terms of the same size.
 //!
 //! | symbol | meaning | shape | unit |
 //! |---|---|---|---|
@@ -18,7 +18,8 @@ use std::f64::consts::TAU;
 
 use rand::{Rng, RngExt};
 
-/// Components per axis: the least number whose sum looks Gaussian; a guess, twice as many change nothing visible.
+/// Components per axis: the least number whose sum looks Gaussian; a guess, twice as many change nothing
+/// visible.
 const COMPONENTS: usize = 16;
 
 /// One axis of a band-limited random signal, in the unit of its rms.
@@ -42,8 +43,8 @@ impl BandNoise {
 
     /// The signal at `start_s + i * step_s` for `i` in `0..count`.
     ///
-    /// Each component turns by a constant angle a step, so no sine is evaluated in the loop; over 1e5 steps the
-    /// rounding errors stay below 1e-10 of the amplitude.
+    /// Each component turns by a constant angle a step, so no sine is evaluated in the loop; over 1e5 steps
+    /// the rounding errors stay below 1e-10 of the amplitude.
     pub(super) fn table(&self, start_s: f64, step_s: f64, count: usize) -> Vec<f64> {
         let angles = self.components.map(|(frequency, phase)| TAU * frequency * start_s + phase);
         let turns = self.components.map(|(frequency, _)| TAU * frequency * step_s);

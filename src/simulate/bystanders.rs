@@ -68,7 +68,8 @@ fn channel(
     Channel { topic, encoding, schema, metadata: BTreeMap::new(), messages }
 }
 
-/// A made-up binary ping: a mark, its number, then echoes that fade, with one from the sea floor, under speckle.
+/// A made-up binary ping: a mark, its number, then echoes that fade, with one from the sea floor, under
+/// speckle.
 fn sonar_ping(number: u32, bytes: u32, rng: &mut impl Rng) -> Vec<u8> {
     let mut data = b"SONR".to_vec();
     data.extend(number.to_le_bytes());

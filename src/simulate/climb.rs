@@ -16,9 +16,7 @@
 //! | s(t) | random force of the sea's surface, in the last phase only | 3 | m/s2 |
 //! | L | depth over which s fades by a factor e | 1 | m |
 //!
-//! Solved by the classical fourth-order Runge-Kutta method at a fixed step of a twentieth of a frame. Between the steps
-//! the quintic through position, velocity and acceleration at both ends holds, so that at every instant the velocity is
-//! the derivative of the position and the acceleration that of the velocity.
+//! Solved by the classical fourth-order Runge-Kutta method at a fixed step of a twentieth of a frame.
 
 use std::f64::consts::TAU;
 
@@ -28,8 +26,10 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::band_noise::BandNoise;
 use super::phases::Phases;
+use super::trajectory::{State, Trajectory};
 
-/// Integration steps per frame: 1 ms for the steep climb, 2.5 ms for the oblique one; the step's error is below 1e-6 m.
+/// Integration steps per frame: 1 ms for the steep climb, 2.5 ms for the oblique one. Against a closed form
+/// the speed is right to 1e-9 m/s.
 const STEPS_PER_FRAME: f64 = 20.0;
 /// One standard deviation of each number from run to run, as a share of it, at `vary` = 1.
 const VARIATION: f64 = 0.05;
@@ -123,85 +123,14 @@ pub enum Start {
     },
 }
 
-/// Where the vehicle is and how it moves, ENU.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct State {
-    /// Position x, y, z, m.
-    pub position: Vector3<f64>,
-    /// Velocity, m/s.
-    pub velocity: Vector3<f64>,
-    /// Acceleration, m/s2.
-    pub acceleration: Vector3<f64>,
-}
-
-/// A climb's true track, known at every instant.
-#[derive(Clone, Debug)]
-pub struct Trajectory {
-    step_s: f64,
-    /// The state at `i * step_s`; at least two.
-    knots: Vec<State>,
-}
-
-impl Trajectory {
-    /// The state at `t_s` seconds after release.
-    ///
-    /// Before release, and beyond the last phase and its margin, the vehicle goes straight on at the speed it has there.
-    #[must_use]
-    pub fn at(&self, t_s: f64) -> State {
-        let last = self.knots.len() - 1;
-        if t_s < 0.0 {
-            return straight_on(&self.knots[0], t_s);
-        }
-        if t_s >= self.end_s() {
-            return straight_on(&self.knots[last], t_s - self.end_s());
-        }
-        let i = ((t_s / self.step_s) as usize).min(last - 1);
-        quintic(&self.knots[i], &self.knots[i + 1], self.step_s, t_s / self.step_s - i as f64)
-    }
-
-    /// The last instant of the integration, s after release.
-    #[must_use]
-    pub fn end_s(&self) -> f64 {
-        (self.knots.len() - 1) as f64 * self.step_s
-    }
-
-    /// The first instant, s after release, at which the state isn't finite.
-    #[must_use]
-    pub fn diverged_s(&self) -> Option<f64> {
-        let finite = |s: &State| (s.position + s.velocity + s.acceleration).iter().all(|x| x.is_finite());
-        self.knots.iter().position(|knot| !finite(knot)).map(|i| i as f64 * self.step_s)
-    }
-}
-
-fn straight_on(state: &State, dt_s: f64) -> State {
-    State { position: state.position + state.velocity * dt_s, acceleration: Vector3::zeros(), ..*state }
-}
-
-/// The quintic through two states `h` seconds apart, at the share `s` of the way.
-fn quintic(a: &State, b: &State, h: f64, s: f64) -> State {
-    // p(s) = c0 + c1 s + c2 s^2 + c3 s^3 + c4 s^4 + c5 s^5, where c0..c2 are the first state's,
-    // and the rest closes the gaps that these leave at s = 1.
-    let (c0, c1, c2) = (a.position, a.velocity * h, a.acceleration * (0.5 * h * h));
-    let gap = b.position - (c0 + c1 + c2);
-    let slope = b.velocity * h - (c1 + c2 * 2.0);
-    let bend = b.acceleration * (h * h) - c2 * 2.0;
-    let c3 = gap * 10.0 - slope * 4.0 + bend * 0.5;
-    let c4 = gap * -15.0 + slope * 7.0 - bend;
-    let c5 = gap * 6.0 - slope * 3.0 + bend * 0.5;
-    State {
-        position: c0 + (c1 + (c2 + (c3 + (c4 + c5 * s) * s) * s) * s) * s,
-        velocity: (c1 + (c2 * 2.0 + (c3 * 3.0 + (c4 * 4.0 + c5 * (5.0 * s)) * s) * s) * s) / h,
-        acceleration: (c2 * 2.0 + (c3 * 6.0 + (c4 * 12.0 + c5 * (20.0 * s)) * s) * s) / (h * h),
-    }
-}
-
 /// The terms of (1) that depend on time alone, every half step.
 struct Forcing {
     step_s: f64,
     /// u d + b k + n.
     free: Vec<Vector3<f64>>,
-    /// s, zero before the last phase.
+    /// s, from the half step `surface_from` on, zero before.
     surface: Vec<Vector3<f64>>,
+    surface_from: usize,
     /// The diagonal of K, 1/m.
     drag: Vector3<f64>,
     /// 1/L, 1/m.
@@ -222,25 +151,30 @@ impl Forcing {
         let axis = ahead * sin_tilt + Vector3::z() * cos_tilt;
         let modulation_phase = TAU * rng.random::<f64>();
 
-        let mut noise = |rms| {
+        let surface_from = 2 * (phases.t2_s / step_s).floor() as usize + 1;
+        let mut noise = |rms, from: usize| {
             let axes: [_; 3] = std::array::from_fn(|_| {
-                BandNoise::draw(rng, rms, c.random_low_hz, c.random_high_hz).table(0.0, 0.5 * step_s, count)
+                let axis = BandNoise::draw(rng, rms, c.random_low_hz, c.random_high_hz);
+                axis.table(0.5 * step_s * from as f64, 0.5 * step_s, count - from)
             });
-            (0..count).map(|i| Vector3::new(axes[0][i], axes[1][i], axes[2][i])).collect::<Vec<_>>()
+            (0..count - from).map(|i| Vector3::new(axes[0][i], axes[1][i], axes[2][i])).collect::<Vec<_>>()
         };
-        let (mut free, mut surface) = (noise(c.random_m_s2), noise(c.surface_m_s2));
+        let (mut free, mut surface) = (noise(c.random_m_s2, 0), noise(c.surface_m_s2, surface_from));
 
-        let fade_in_s = 0.25 * (phases.t3_s - phases.t2_s);
-        for (i, (free, surface)) in free.iter_mut().zip(&mut surface).enumerate() {
+        for (i, free) in free.iter_mut().enumerate() {
             let t = 0.5 * step_s * i as f64;
             let modulation = 1.0 + c.modulation * (TAU * c.modulation_hz * t + modulation_phase).sin();
             *free += axis * (c.thrust_m_s2 * c.pulse(t) * modulation) + Vector3::z() * c.buoyancy_m_s2;
-            *surface *= smooth_step((t - phases.t2_s) / fade_in_s);
+        }
+        let fade_in_s = 0.25 * (phases.t3_s - phases.t2_s);
+        for (i, surface) in (surface_from..).zip(&mut surface) {
+            *surface *= smooth_step((0.5 * step_s * i as f64 - phases.t2_s) / fade_in_s);
         }
         Self {
             step_s,
             free,
             surface,
+            surface_from,
             drag: Vector3::new(c.drag_horizontal_per_m, c.drag_horizontal_per_m, c.drag_vertical_per_m),
             fade_per_m: 1.0 / c.surface_depth_m,
             velocity: ahead * c.carrier_m_s,
@@ -249,20 +183,43 @@ impl Forcing {
 
     /// v' at the half step `i`.
     fn acceleration(&self, i: usize, z: f64, v: &Vector3<f64>) -> Vector3<f64> {
-        let surface = self.surface[i] * (z.min(0.0) * self.fade_per_m).exp();
-        self.free[i] - self.drag.component_mul(v) * v.norm() + surface // (1)
+        let calm = self.free[i] - self.drag.component_mul(v) * v.norm();
+        if i < self.surface_from {
+            return calm;
+        }
+        calm + self.surface[i - self.surface_from] * (z.min(0.0) * self.fade_per_m).exp() // (1)
     }
 
     /// The track from the height `z_m` at x = y = 0.
     fn integrate(&self, z_m: f64) -> Trajectory {
-        let h = self.step_s;
-        let (mut p, mut v) = (Vector3::new(0.0, 0.0, z_m), self.velocity);
+        let first = State {
+            position: Vector3::new(0.0, 0.0, z_m),
+            velocity: self.velocity,
+            acceleration: self.acceleration(0, z_m, &self.velocity),
+        };
         let mut knots = Vec::with_capacity(self.free.len() / 2 + 1);
-        for i in (0..self.free.len()).step_by(2) {
-            let a1 = self.acceleration(i, p.z, &v);
-            knots.push(State { position: p, velocity: v, acceleration: a1 });
+        knots.push(first);
+        self.go_on(&mut knots);
+        Trajectory { step_s: self.step_s, knots }
+    }
+
+    /// The same track `dz_m` higher: before the last phase, (1) doesn't depend on the height.
+    fn lift(&self, trajectory: &mut Trajectory, dz_m: f64) {
+        let knots = &mut trajectory.knots;
+        knots.truncate((self.surface_from - 1) / 2 + 1);
+        for knot in knots.iter_mut() {
+            knot.position.z += dz_m;
+        }
+        self.go_on(knots);
+    }
+
+    /// Integrates from the last knot to the end by Runge and Kutta's method.
+    fn go_on(&self, knots: &mut Vec<State>) {
+        let h = self.step_s;
+        while let Some(&State { position: mut p, velocity: mut v, acceleration: a1 }) = knots.last() {
+            let i = 2 * (knots.len() - 1);
             if i + 2 >= self.free.len() {
-                break;
+                return;
             }
             let v2 = v + a1 * (0.5 * h);
             let a2 = self.acceleration(i + 1, p.z + 0.5 * h * v.z, &v2);
@@ -272,12 +229,14 @@ impl Forcing {
             let a4 = self.acceleration(i + 2, p.z + h * v3.z, &v4);
             p += (v + (v2 + v3) * 2.0 + v4) * (h / 6.0);
             v += (a1 + (a2 + a3) * 2.0 + a4) * (h / 6.0);
+            let a = self.acceleration(i + 2, p.z, &v);
+            knots.push(State { position: p, velocity: v, acceleration: a });
         }
-        Trajectory { step_s: h, knots }
     }
 }
 
-/// The true track of one run: constants off by some per cent times `vary`, heading and random forces from `rng`.
+/// The true track of one run: constants off by some per cent times `vary`, heading and random forces from
+/// `rng`.
 #[must_use]
 pub fn climb(
     constants: &ClimbConstants,
@@ -286,25 +245,24 @@ pub fn climb(
     vary: f64,
     rng: &mut impl Rng,
 ) -> Trajectory {
-    /// Runs until the depth is found: each leaves about a tenth of the error of the one before.
+    /// Runs at most until the depth is found; each leaves a fraction of the error of the one before.
     const RUNS: usize = 12;
     const CLOSE_M: f64 = 1e-3;
 
     let forcing = Forcing::draw(constants, phases, vary, rng);
-    let (mut z_m, target_m) = match start {
+    let target_m = match start {
         Start::At { z_m } => return forcing.integrate(z_m),
-        Start::ToReach { z_m } => (z_m - 60.0, z_m),
+        Start::ToReach { z_m } => z_m,
     };
     let seen = (phases.t3_s / forcing.step_s).round() as usize + 1;
-    let mut trajectory = forcing.integrate(z_m);
+    let mut trajectory = forcing.integrate(target_m - 60.0);
     for _ in 0..RUNS {
         let top_m =
             trajectory.knots.iter().take(seen).map(|knot| knot.position.z).fold(f64::NEG_INFINITY, f64::max);
         if (top_m - target_m).abs() < CLOSE_M || !top_m.is_finite() {
             break;
         }
-        z_m += target_m - top_m;
-        trajectory = forcing.integrate(z_m);
+        forcing.lift(&mut trajectory, target_m - top_m);
     }
     trajectory
 }

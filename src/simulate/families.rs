@@ -1,7 +1,9 @@
 //! Nine families of runs, each with one trouble of its own; a study runs many seeds of each.
 
+use super::climb_scenario::Profile;
 use super::error::SimulateError;
-use super::scenario::{ErrorsScenario, Profile, Scenario};
+use super::scenario::Scenario;
+use super::sensor_scenario::ErrorsScenario;
 
 /// The families' names.
 pub const FAMILIES: [&str; 9] =
@@ -10,8 +12,8 @@ pub const FAMILIES: [&str; 9] =
 impl Scenario {
     /// The scenario of a family, with seed 1.
     ///
-    /// Rates, phases and jitters are those of logs that another simulator made of the same families. The drift of `drift`,
-    /// 0.18 m/s, is the rms over four of those.
+    /// Rates, phases and jitters are those of logs that another simulator made of the same families. The
+    /// drift of `drift`, 0.18 m/s, is the rms over four of those.
     ///
     /// # Errors
     ///
@@ -68,8 +70,7 @@ impl Scenario {
             }
             _ => return Err(SimulateError::UnknownFamily { name: name.to_owned() }),
         };
-        scenario.description = description.to_owned();
-        Ok(scenario)
+        Ok(Self { description: description.to_owned(), ..scenario })
     }
 
     fn sample_beacon(&mut self, rate_hz: f64, phase: f64, jitter_s: f64) {

@@ -1,4 +1,5 @@
-//! A simulation as an MCAP log that looks like a real one: tracks, channels of no concern, notes, and how it was made.
+//! A simulation as an MCAP log that looks like a real one: tracks, channels of no concern, notes, and how it
+//! was made.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -57,7 +58,8 @@ pub fn write_log<W: Write + Seek>(scenario: &Scenario, writer: W) -> Result<Simu
 ///
 /// # Errors
 ///
-/// [`SimulateError::Log`] where writing fails, [`SimulateError::Serialize`] for a scenario that TOML can't hold.
+/// [`SimulateError::Log`] where writing fails, [`SimulateError::Serialize`] for a scenario that TOML can't
+/// hold.
 pub fn write_simulation<W: Write + Seek>(
     scenario: &Scenario,
     simulation: &Simulation,

@@ -1,33 +1,41 @@
-//! Recordings of climbs that never were, with their truth: a point mass, its sensors, and a log that looks like a real one.
+//! Recordings of climbs that never were, with their truth: a point mass, its sensors, and a log that looks
+//! like a real one.
 //!
 //! ```text
 //! Scenario -> climb (truth) -> sensors (samples) -> Simulation -> log (MCAP)
 //! ```
 //!
-//! Everything up to [`Simulation`] is pure: the same scenario gives the same numbers, and random numbers come from its seed
-//! alone. A simulated log is the same to the byte, as far as the platform's sines and exponentials are.
+//! Everything up to [`Simulation`] is pure: the same scenario gives the same numbers, and random numbers come
+//! from its seed alone. A simulated log is the same to the byte, as far as the platform's sines and
+//! exponentials are.
 
 mod band_noise;
 mod bystanders;
 mod climb;
+mod climb_scenario;
 mod error;
 mod families;
 mod log;
 mod phases;
 mod scenario;
+mod sensor_scenario;
 mod sensors;
+mod trajectory;
 mod validate;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-pub use climb::{ClimbConstants, Start, State, Trajectory, climb};
+pub use climb::{ClimbConstants, Start, climb};
+pub use climb_scenario::{ClimbScenario, Profile};
 pub use error::SimulateError;
 pub use families::FAMILIES;
 pub use log::{write_log, write_simulation};
 pub use phases::{Frames, Phases};
-pub use scenario::{ClimbScenario, ErrorsScenario, Profile, RecordingScenario, Scenario, SensorScenario};
+pub use scenario::{RecordingScenario, Scenario};
+pub use sensor_scenario::{ErrorsScenario, SensorScenario};
 pub use sensors::{SensorErrors, SensorRecord, SensorSample, Window, watch};
+pub use trajectory::{State, Trajectory};
 
 /// Rate of the table of the truth, Hz.
 pub const TRUTH_RATE_HZ: f64 = 100.0;
@@ -79,7 +87,8 @@ impl Simulation {
 ///
 /// # Errors
 ///
-/// The errors of [`Scenario::validate`]; [`SimulateError::Diverged`] where the track leaves the range of numbers.
+/// The errors of [`Scenario::validate`]; [`SimulateError::Diverged`] where the track leaves the range of
+/// numbers.
 pub fn simulate(scenario: &Scenario) -> Result<Simulation, SimulateError> {
     scenario.validate()?;
     let phases = scenario.climb.phases();
@@ -123,3 +132,6 @@ pub fn simulate(scenario: &Scenario) -> Result<Simulation, SimulateError> {
     });
     Ok(Simulation { trajectory, truth, sensors, phases, characteristic_points })
 }
+
+#[cfg(test)]
+mod tests;

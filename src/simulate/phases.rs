@@ -39,8 +39,9 @@ impl Phases {
     #[must_use]
     pub fn new(frames: &Frames, frame_s: f64, gap_s: f64) -> Self {
         let at = |frame: u32| f64::from(frame) * frame_s;
-        let seen = frames.tether + frames.overlap + frames.beacon;
-        let (begin, end) = (at(frames.tether), at((frames.tether + frames.overlap).saturating_sub(1)));
+        let tethered = frames.tether.saturating_add(frames.overlap);
+        let seen = tethered.saturating_add(frames.beacon);
+        let (begin, end) = (at(frames.tether), at(tethered.saturating_sub(1)));
         let t1_s = 0.5 * (begin + end);
         let (overlap_begin_s, overlap_end_s) =
             if gap_s > 0.0 { (t1_s + 0.5 * gap_s, t1_s - 0.5 * gap_s) } else { (begin, end) };

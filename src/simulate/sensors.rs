@@ -16,16 +16,16 @@
 //! | w | velocity bias | 3 | m/s |
 //! | e, f | noise, white or AR(1) from sample to sample | 3 | m, m/s |
 //!
-//! On top come jitter of the sampling, latency of the reception, outliers and dropouts. Each draws from a random stream of
-//! its own, so that a change to one leaves the others, and the truth, as they were.
+//! On top come jitter of the sampling, latency of the reception, outliers and dropouts. Each draws from a
+//! random stream of its own, so that a change to one leaves the others, and the truth, as they were.
 
 use nalgebra::Vector3;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal, UnitSphere};
 
-use super::climb::Trajectory;
-use super::scenario::{ErrorsScenario, SensorScenario};
+use super::sensor_scenario::{ErrorsScenario, SensorScenario};
+use super::trajectory::Trajectory;
 
 /// A sensor's systematic errors, (1) to (3).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -43,7 +43,8 @@ pub struct SensorErrors {
 }
 
 impl SensorErrors {
-    /// Draws the errors that the scenario leaves open; the fixed ones cost the same draws, and change no other.
+    /// Draws the errors that the scenario leaves open; the fixed ones cost the same draws, and change no
+    /// other.
     #[must_use]
     pub fn draw(scenario: &ErrorsScenario, rng: &mut impl Rng) -> Self {
         let mut vector = |fixed: Option<[f64; 3]>, sigma: f64| {
@@ -64,7 +65,8 @@ impl SensorErrors {
         }
     }
 
-    /// Position (m) and velocity (m/s) without noise at the true instant `t_s`, with the middle of the overlap at `middle_s`.
+    /// Position (m) and velocity (m/s) without noise at the true instant `t_s`, with the middle of the
+    /// overlap at `middle_s`.
     #[must_use]
     pub fn observe(&self, truth: &Trajectory, t_s: f64, middle_s: f64) -> (Vector3<f64>, Vector3<f64>) {
         let (now, middle) = (truth.at(t_s), truth.at(middle_s));

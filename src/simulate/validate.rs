@@ -1,7 +1,9 @@
 //! Whether a scenario makes sense, and stays within what a machine can hold.
 
+use super::climb_scenario::ClimbScenario;
 use super::error::SimulateError;
-use super::scenario::{ClimbScenario, ErrorsScenario, RecordingScenario, Scenario, SensorScenario};
+use super::scenario::{RecordingScenario, Scenario};
+use super::sensor_scenario::{ErrorsScenario, SensorScenario};
 
 /// Most samples of one sensor, and messages of one other channel: three hours at 100 Hz.
 const MAX_SAMPLES: f64 = 1e6;
@@ -47,8 +49,8 @@ impl Scenario {
     ///
     /// # Errors
     ///
-    /// [`SimulateError::OutOfRange`] with the key and its range, [`SimulateError::Reversed`] for a range whose ends are
-    /// swapped, [`SimulateError::TooLarge`] for more samples than a log should hold.
+    /// [`SimulateError::OutOfRange`] with the key and its range, [`SimulateError::Reversed`] for a range
+    /// whose ends are swapped, [`SimulateError::TooLarge`] for more samples than a log should hold.
     pub fn validate(&self) -> Result<(), SimulateError> {
         Table("").within("epoch_ns", self.epoch_ns as f64, 1e15, 4e18)?;
         climb(&Table("climb"), &self.climb)?;
@@ -69,7 +71,7 @@ fn climb(table: &Table, climb: &ClimbScenario) -> Result<(), SimulateError> {
     let c = climb.constants();
     let phases = climb.phases();
     table.all_within(&[
-        ("vary", climb.vary, 0.0, 10.0),
+        ("vary", climb.vary, 0.0, 5.0),
         ("frame_s", phases.frame_s, 1e-3, 0.1),
         ("overlap_frames", f64::from(climb.overlap_frames), 1.0, MAX_FRAMES),
         ("unseen_frames", f64::from(climb.unseen_frames), 1.0, MAX_FRAMES),
