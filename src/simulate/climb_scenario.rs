@@ -12,7 +12,7 @@ pub enum Profile {
     /// Nearly upright: 3.7 s seen, 2 s unseen, about 17 m/s, from about 60 m.
     #[default]
     Steep,
-    /// Shallow: 9 s seen, 5 s unseen, about 20 m/s.
+    /// Shallow: 9 s seen, 5 s unseen, about 20 m/s, from about 63 m, over 165 m of ground.
     Oblique,
 }
 

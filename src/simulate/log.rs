@@ -65,6 +65,7 @@ pub fn write_simulation<W: Write + Seek>(
     simulation: &Simulation,
     writer: W,
 ) -> Result<(), SimulateError> {
+    let made_by = scenario.to_toml()?;
     let release = Time::from_ns(scenario.epoch_ns);
     let mut channels: Vec<Channel> =
         simulation.sensors.iter().map(|sensor| track_channel(sensor, release)).collect();
@@ -83,7 +84,7 @@ pub fn write_simulation<W: Write + Seek>(
     let begin = release.plus_seconds(-scenario.recording.lead_s);
     for (name, media_type, text) in [
         ("deployment_notes.txt", "text/plain", notes(simulation)),
-        ("scenario.toml", "application/toml", scenario.to_toml()?),
+        ("scenario.toml", "application/toml", made_by),
     ] {
         log.attach(&mcap::Attachment {
             log_time: begin.to_log(),
