@@ -8,6 +8,7 @@ pub mod log;
 pub mod math;
 pub mod publish;
 pub mod sample;
+pub mod simulate;
 pub mod source;
 pub mod time;
 pub mod track;

@@ -1,0 +1,65 @@
+//! The stored sample logs are what their scenarios make. `TRACKFUSE_UPDATE_SAMPLES=1` writes them anew.
+
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+
+use trackfuse::simulate::{Scenario, write_log};
+
+fn scenarios() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_logs");
+    let mut paths: Vec<PathBuf> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
+        .collect();
+    paths.sort();
+    paths
+}
+
+fn log_of(scenario: &Path) -> Vec<u8> {
+    let scenario = Scenario::from_toml(&fs::read_to_string(scenario).unwrap()).unwrap();
+    let mut log = Cursor::new(Vec::new());
+    write_log(&scenario, &mut log).unwrap();
+    log.into_inner()
+}
+
+#[test]
+fn every_sample_log_is_what_its_scenario_makes() {
+    let update = std::env::var_os("TRACKFUSE_UPDATE_SAMPLES").is_some();
+    let scenarios = scenarios();
+    assert_eq!(scenarios.len(), 3, "{scenarios:?}");
+    for scenario in scenarios {
+        let stored = scenario.with_extension("mcap");
+        let log = log_of(&scenario);
+        if update {
+            fs::write(&stored, log).unwrap();
+            continue;
+        }
+        let same = fs::read(&stored).unwrap() == log;
+        assert!(same, "{} differs; hint: TRACKFUSE_UPDATE_SAMPLES=1 writes it anew", stored.display());
+    }
+}
+
+#[test]
+fn sample_logs_are_small_indexed_and_have_the_channels_they_promise() {
+    for path in scenarios() {
+        let bytes = fs::read(path.with_extension("mcap")).unwrap();
+        assert!(bytes.len() < 2_000_000, "{}: {} bytes", path.display(), bytes.len());
+        let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+        assert!(summary.chunk_indexes.len() > 2, "{}", path.display());
+        assert_eq!(summary.attachment_indexes.len(), 2);
+        assert_eq!(summary.metadata_indexes.len(), 2);
+        let topics: Vec<&str> = summary.channels.values().map(|channel| channel.topic.as_str()).collect();
+        let single = path.ends_with("single_source.toml");
+        assert_eq!(topics.contains(&"/tether/track"), !single, "{topics:?}");
+        for topic in ["/beacon/track", "/reference/ins", "/sonar/image", "/ship/log"] {
+            assert!(topics.contains(&topic), "{topic} is missing in {topics:?}");
+        }
+        let times: Vec<u64> =
+            mcap::MessageStream::new(&bytes).unwrap().map(|message| message.unwrap().log_time).collect();
+        assert!(times.is_sorted(), "{}", path.display());
+    }
+}
