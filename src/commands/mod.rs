@@ -1,0 +1,115 @@
+//! The commands: each holds the order of its steps, and nothing else.
+
+mod fuse;
+mod simulate;
+
+pub use fuse::fuse;
+pub use simulate::simulate;
+
+use std::io::{self, IsTerminal, Write};
+use std::process::ExitCode;
+
+use crate::cli::Voice;
+use crate::config::ConfigError;
+use crate::estimate::EstimateError;
+use crate::log::LogError;
+use crate::simulate::SimulateError;
+use crate::source::SourceError;
+
+/// How a command ended that did what it should.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// Done.
+    Done,
+    /// Done, with warnings that a person must read.
+    Warned,
+}
+
+/// Why a command wrote nothing.
+#[derive(Debug, thiserror::Error)]
+pub enum CommandError {
+    /// The config.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The log.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// The sources.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// The estimator.
+    #[error("{0}")]
+    Estimate(#[from] EstimateError),
+    /// The simulator.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+    /// A file that is no log.
+    #[error("{path}: {source}")]
+    File {
+        /// The file.
+        path: String,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+impl CommandError {
+    /// What to do about it.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        match self {
+            Self::Config(error) => error.hint(),
+            Self::Log(error) => error.hint(),
+            Self::Source(error) => error.hint(),
+            _ => None,
+        }
+    }
+
+    /// 2 where the user's words are at fault, else 1.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        let usage = match self {
+            Self::Config(_) => true,
+            Self::Source(SourceError::Log(error)) | Self::Log(error) => is_usage(error),
+            Self::Source(error) => error.is_usage(),
+            Self::Simulate(error) => !matches!(error, SimulateError::Diverged { .. } | SimulateError::Log(_)),
+            Self::Estimate(_) | Self::File { .. } => false,
+        };
+        if usage { 2 } else { 1 }
+    }
+}
+
+fn is_usage(error: &LogError) -> bool {
+    matches!(
+        error,
+        LogError::OutputExists { .. } | LogError::OutputIsInput { .. } | LogError::TopicTaken { .. }
+    )
+}
+
+impl From<Outcome> for ExitCode {
+    fn from(outcome: Outcome) -> Self {
+        match outcome {
+            Outcome::Done => Self::SUCCESS,
+            Outcome::Warned => Self::from(3),
+        }
+    }
+}
+
+/// Prints a command's result on stdout, and its warnings on stderr where they would not be seen otherwise:
+/// the text holds them too.
+fn say(voice: Voice, text: &str, json: &impl serde::Serialize, warnings: &[String]) {
+    // a reader that went away is no error of ours
+    let mut stdout = io::stdout().lock();
+    let _ = if voice.json {
+        let json = serde_json::to_string_pretty(json).unwrap_or_default();
+        writeln!(stdout, "{json}")
+    } else {
+        write!(stdout, "{text}")
+    };
+    if !voice.quiet && (voice.json || !stdout.is_terminal()) {
+        let mut stderr = io::stderr().lock();
+        for warning in warnings {
+            let _ = writeln!(stderr, "warning: {warning}");
+        }
+    }
+}

@@ -1,0 +1,355 @@
+//! What is to be said of a result: one value, rendered as text for people or as JSON for programs.
+
+mod text;
+
+pub use text::render;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::fusion::{Fusion, Plan};
+use crate::sample::Quantity;
+use crate::source::{Candidate, Loaded};
+use crate::time::Time;
+use crate::estimate::coverage;
+
+/// The report of `fuse`. Nanoseconds are strings, since JSON numbers lose them.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct Report {
+    /// Version of the program.
+    pub version: String,
+    /// The log that was read.
+    pub input: String,
+    /// The log that was written.
+    pub output: String,
+    /// T0, from which all `_s` times below count, ns since the epoch of the datum's clock.
+    pub t0_ns: String,
+    /// The sources, in the order of their bits.
+    pub sources: Vec<SourceReport>,
+    /// Topics that hold a position or velocity, but were not used.
+    pub unused_topics: Vec<String>,
+    /// How the track was made.
+    pub track: TrackReport,
+    /// The track phase by phase.
+    pub phases: Vec<PhaseReport>,
+    /// How the sources differ where they overlap.
+    pub disagreements: Vec<DisagreementReport>,
+    /// What SFF chose.
+    pub spline: Option<SplineReport>,
+    /// How the track was carried on.
+    pub extrapolation: Option<ExtrapolationReport>,
+    /// Characteristic points that were reached.
+    pub characteristic_points: Vec<EventReport>,
+    /// What a person must read.
+    pub warnings: Vec<String>,
+}
+
+/// A source and its samples.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct SourceReport {
+    /// Its name.
+    pub name: String,
+    /// Whether its bias and clock are zero by definition: nobody can see its own errors.
+    pub datum: bool,
+    /// Message path of its position.
+    pub position: Option<String>,
+    /// Message path of its velocity.
+    pub velocity: Option<String>,
+    /// Frame that its messages name.
+    pub frame_id: String,
+    /// Number of positions.
+    pub positions: usize,
+    /// Number of velocities.
+    pub velocities: usize,
+    /// Samples a second: the median.
+    pub rate_hz: Option<f64>,
+    /// First and last sample, s since T0.
+    pub span_s: Option<(f64, f64)>,
+    /// What its times are: `stamp`, `publish` or `log`.
+    pub clock: String,
+    /// Median of log time less sample time, s.
+    pub delay_s: f64,
+    /// Half the width of the middle 68 % of it, s.
+    pub delay_spread_s: f64,
+    /// Standard deviation of its positions, m.
+    pub position_sigma_m: Option<f64>,
+    /// Where that comes from.
+    pub position_sigma_from: Option<String>,
+    /// Standard deviation of its velocities, m/s.
+    pub velocity_sigma_m_s: Option<f64>,
+    /// Where that comes from.
+    pub velocity_sigma_from: Option<String>,
+}
+
+/// How the track was made.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct TrackReport {
+    /// The estimator.
+    pub method: String,
+    /// `shared`, or `independent`.
+    pub coefficients: String,
+    /// Frame of the coordinates.
+    pub frame_id: String,
+    /// Number of points.
+    pub points: usize,
+    /// Points a second.
+    pub rate_hz: f64,
+    /// First and last point, s since T0.
+    pub span_s: (f64, f64),
+    /// Pieces that long silences cut it into.
+    pub pieces: usize,
+}
+
+/// One kind of stretch, summed over the log.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct PhaseReport {
+    /// `single`, `overlap`, `bridged` or `extrapolated`.
+    pub phase: String,
+    /// The sources that see it.
+    pub sources: Vec<String>,
+    /// First and last point, s since T0.
+    pub span_s: (f64, f64),
+    /// Number of points.
+    pub points: usize,
+    /// Root mean square 3-D distance of the samples' positions from the track (Zhang 2025, eq. 12), m.
+    pub position_rmse_m: Option<f64>,
+    /// The same of the velocities, m/s.
+    pub velocity_rmse_m_s: Option<f64>,
+    /// Root mean square 3-D standard deviation of the track's positions, m.
+    pub position_sigma_m: f64,
+    /// The same of the velocities, m/s.
+    pub velocity_sigma_m_s: f64,
+}
+
+/// A difference between two sources where both see.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct DisagreementReport {
+    /// The source that is subtracted.
+    pub first: String,
+    /// The source that it is subtracted from.
+    pub second: String,
+    /// `position` or `velocity`.
+    pub quantity: String,
+    /// Median difference, m or m/s.
+    pub median: [f64; 3],
+    /// Standard deviation of that median.
+    pub sigma: [f64; 3],
+    /// Number of instants compared.
+    pub count: usize,
+    /// Whether it is more than noise.
+    pub significant: bool,
+}
+
+/// What SFF chose, for the last piece.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct SplineReport {
+    /// Number of knots.
+    pub knots: usize,
+    /// Their spacing, s.
+    pub knot_spacing_s: f64,
+    /// Weight of the jerk penalty by axis, 1/m^2.
+    pub lambda: [f64; 3],
+    /// Residuals over sigmas by axis: 1 where the sigmas are right.
+    pub noise_scale: [f64; 3],
+}
+
+/// How the track was carried on.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct ExtrapolationReport {
+    /// The method.
+    pub method: String,
+    /// Order of the polynomial.
+    pub order: usize,
+    /// Whether jerk and snap were kept small.
+    pub prior: bool,
+    /// Length of the stretch that it was fitted to, s.
+    pub window_s: f64,
+    /// How far it goes, s.
+    pub horizon_s: f64,
+    /// Root mean square 3-D position error of the same extrapolation from earlier instants, m.
+    pub holdout_position_m: f64,
+    /// The same of the velocity, m/s.
+    pub holdout_velocity_m_s: f64,
+    /// The mean lead at which those errors were taken, s.
+    pub holdout_lead_s: f64,
+    /// How many such trials there were.
+    pub holdout_trials: usize,
+}
+
+/// A characteristic point.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct EventReport {
+    /// Its name.
+    pub name: String,
+    /// The instant, ns since the epoch of the datum's clock.
+    pub time_ns: String,
+    /// Seconds since T0.
+    pub time_s: f64,
+    /// Standard deviation of that time, s.
+    pub time_sigma_s: Option<f64>,
+    /// Position, m.
+    pub position_m: [f64; 3],
+    /// Velocity, m/s.
+    pub velocity_m_s: [f64; 3],
+    /// Its standard deviation, m/s.
+    pub velocity_sigma_m_s: [f64; 3],
+    /// `single`, `overlap`, `bridged` or `extrapolated`.
+    pub phase: String,
+}
+
+/// What a report is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Parts<'a> {
+    /// The log that was read.
+    pub input: &'a str,
+    /// The log that is written.
+    pub output: &'a str,
+    /// T0.
+    pub t0: Time,
+    /// The sources.
+    pub loaded: &'a [Loaded],
+    /// Which of them is the datum.
+    pub datum: usize,
+    /// Channels that were passed over.
+    pub unused: &'a [Candidate],
+    /// What was to be done.
+    pub plan: &'a Plan,
+    /// What came of it.
+    pub fusion: &'a Fusion,
+    /// All that a person must read.
+    pub warnings: &'a [String],
+}
+
+impl Report {
+    /// Puts a report together.
+    #[must_use]
+    pub fn new(parts: &Parts<'_>) -> Self {
+        let Parts { input, output, t0, loaded, datum, unused, plan, fusion, warnings } = *parts;
+        let since_t0 = |s: f64| plan.origin.plus_seconds(s).seconds_since(t0);
+        let span = |(a, b): (f64, f64)| (since_t0(a), since_t0(b));
+        let name = |i: usize| loaded[i].source.name.clone();
+        let points = &fusion.track.points;
+        let end = |p: Option<&crate::track::TrackPoint>| p.map_or(0.0, |p| p.time.seconds_since(t0));
+        Self {
+            version: env!("CARGO_PKG_VERSION").into(),
+            input: input.into(),
+            output: output.into(),
+            t0_ns: t0.ns().to_string(),
+            sources: loaded
+                .iter()
+                .enumerate()
+                .map(|(i, l)| SourceReport::new(l, i == datum, l.source.span_s().map(span)))
+                .collect(),
+            unused_topics: unused.iter().map(|c| c.topic.clone()).collect(),
+            track: TrackReport {
+                method: plan.method.name().into(),
+                coefficients: plan.coefficients.name().into(),
+                frame_id: fusion.track.frame_id.clone(),
+                points: points.len(),
+                rate_hz: plan.rate_hz,
+                span_s: (end(points.first()), end(points.last())),
+                pieces: fusion.pieces.len(),
+            },
+            phases: fusion
+                .phases
+                .iter()
+                .map(|p| PhaseReport {
+                    phase: p.phase.name().into(),
+                    sources: (0..loaded.len()).filter(|i| p.seen_by >> i & 1 == 1).map(name).collect(),
+                    span_s: span(p.span_s),
+                    points: p.points,
+                    position_rmse_m: p.rmse[Quantity::Position as usize],
+                    velocity_rmse_m_s: p.rmse[Quantity::Velocity as usize],
+                    position_sigma_m: p.sigma[Quantity::Position as usize],
+                    velocity_sigma_m_s: p.sigma[Quantity::Velocity as usize],
+                })
+                .collect(),
+            disagreements: fusion
+                .disagreements
+                .iter()
+                .map(|d| DisagreementReport {
+                    first: name(d.sources.0),
+                    second: name(d.sources.1),
+                    quantity: d.quantity.name().into(),
+                    median: d.median,
+                    sigma: d.sigma,
+                    count: d.count,
+                    significant: d.is_significant(),
+                })
+                .collect(),
+            spline: fusion.spline.map(|s| SplineReport {
+                knots: s.knots.0,
+                knot_spacing_s: s.knots.1,
+                lambda: s.lambda,
+                noise_scale: s.noise_scale,
+            }),
+            extrapolation: plan.extrapolation.zip(fusion.holdout).map(|(s, h)| ExtrapolationReport {
+                method: "pcf".into(),
+                order: s.order,
+                prior: s.prior.is_some(),
+                window_s: s.window_s,
+                horizon_s: s.horizon_s,
+                holdout_position_m: h.position_m,
+                holdout_velocity_m_s: h.velocity_m_s,
+                holdout_lead_s: h.lead_s,
+                holdout_trials: h.trials,
+            }),
+            characteristic_points: fusion
+                .events
+                .iter()
+                .map(|e| EventReport {
+                    name: e.name.clone(),
+                    time_ns: e.time.ns().to_string(),
+                    time_s: e.time.seconds_since(t0),
+                    time_sigma_s: e.time_sigma_s,
+                    position_m: e.state.position,
+                    velocity_m_s: e.state.velocity,
+                    velocity_sigma_m_s: e.state.velocity_sigma,
+                    phase: e.phase.name().into(),
+                })
+                .collect(),
+            warnings: warnings.to_vec(),
+        }
+    }
+}
+
+impl SourceReport {
+    fn new(loaded: &Loaded, datum: bool, span_s: Option<(f64, f64)>) -> Self {
+        let [position, velocity] = loaded.sigma;
+        Self {
+            name: loaded.source.name.clone(),
+            datum,
+            position: loaded.config.position.clone(),
+            velocity: loaded.config.velocity.clone(),
+            frame_id: loaded.frame_id.clone(),
+            positions: loaded.source.positions.len(),
+            velocities: loaded.source.velocities.len(),
+            rate_hz: coverage::median_interval_s(&loaded.source).map(f64::recip),
+            span_s,
+            clock: loaded.timing.clock.clone(),
+            delay_s: loaded.timing.delay_s,
+            delay_spread_s: loaded.timing.delay_spread_s,
+            position_sigma_m: position.map(|s| s.0),
+            position_sigma_from: position.map(|s| s.1.name().into()),
+            velocity_sigma_m_s: velocity.map(|s| s.0),
+            velocity_sigma_from: velocity.map(|s| s.1.name().into()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    #[test]
+    fn the_schema_in_the_tree_is_the_one_of_this_code() {
+        let schema =
+            serde_json::to_string_pretty(&schemars::schema_for!(super::Report)).expect("a schema is JSON");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas/fuse.schema.json");
+        if std::env::var_os("TRACKFUSE_UPDATE_SCHEMAS").is_some() {
+            std::fs::write(&path, format!("{schema}\n")).expect("the tree can be written");
+        }
+        let stored = std::fs::read_to_string(&path).expect("schemas/fuse.schema.json");
+        assert_eq!(stored.trim_end(), schema, "run the tests once with TRACKFUSE_UPDATE_SCHEMAS=1");
+    }
+}

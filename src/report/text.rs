@@ -1,0 +1,150 @@
+//! The report as a page of text that is read in ten seconds.
+
+use std::fmt::{self, Write};
+
+use super::Report;
+
+/// The report as text, lines of about 100 characters.
+#[must_use]
+pub fn render(report: &Report) -> String {
+    let mut page = String::new();
+    // writing to a String can't fail
+    let _ = write_page(&mut page, report);
+    page
+}
+
+fn write_page(out: &mut String, report: &Report) -> fmt::Result {
+    let track = &report.track;
+    writeln!(out, "{} -> {}", report.input, report.output)?;
+    writeln!(out)?;
+    sources(out, report)?;
+    writeln!(out)?;
+    let duration = track.span_s.1 - track.span_s.0;
+    write!(out, "track   {} ({}), {} points at {} Hz over {duration:.2} s", track.method.to_uppercase(), track.coefficients, track.points, short(track.rate_hz))?;
+    if track.pieces > 1 {
+        write!(out, ", in {} pieces", track.pieces)?;
+    }
+    if !track.frame_id.is_empty() {
+        write!(out, ", frame {:?}", track.frame_id)?;
+    }
+    writeln!(out)?;
+    if let Some(spline) = &report.spline {
+        let [x, y, z] = spline.noise_scale;
+        writeln!(
+            out,
+            "        {} knots, {:.3} s apart; residuals / sigmas: {x:.2} {y:.2} {z:.2} (x y z)",
+            spline.knots, spline.knot_spacing_s
+        )?;
+    }
+    if let Some(e) = &report.extrapolation {
+        writeln!(
+            out,
+            "        carried on {} s by {} of order {}{}, fitted to the last {:.2} s; {} trials {:.2} s ahead: \
+             {:.2} m, {:.2} m/s off",
+            short(e.horizon_s),
+            e.method.to_uppercase(),
+            e.order,
+            if e.prior { " with a prior on jerk and snap" } else { "" },
+            e.window_s,
+            e.holdout_trials,
+            e.holdout_lead_s,
+            e.holdout_position_m,
+            e.holdout_velocity_m_s
+        )?;
+    }
+    writeln!(out)?;
+    phases(out, report)?;
+    if !report.characteristic_points.is_empty() {
+        writeln!(out)?;
+        events(out, report)?;
+    }
+    if !report.warnings.is_empty() {
+        writeln!(out)?;
+        for warning in &report.warnings {
+            writeln!(out, "warning: {warning}")?;
+        }
+    }
+    Ok(())
+}
+
+fn sources(out: &mut String, report: &Report) -> fmt::Result {
+    writeln!(
+        out,
+        "{:<22} {:>9} {:>8} {:>17}  {:<8} {:<18} sigma m, m/s",
+        "source", "samples", "Hz", "from .. to s", "clock", "log - sample ms"
+    )?;
+    for source in &report.sources {
+        let name = if source.datum { format!("{} (datum)", source.name) } else { source.name.clone() };
+        let span = source.span_s.map_or("-".into(), |(a, b)| format!("{a:.2} .. {b:.2}"));
+        let delay = format!("{:.1} ± {:.1}", 1e3 * source.delay_s, 1e3 * source.delay_spread_s);
+        let sigma = [
+            (source.position_sigma_m, &source.position_sigma_from),
+            (source.velocity_sigma_m_s, &source.velocity_sigma_from),
+        ];
+        let sigma = sigma.map(|(sigma, from)| {
+            sigma.zip(from.as_ref()).map_or("-".into(), |(s, from)| format!("{s:.3} ({from})"))
+        });
+        let samples = source.positions.max(source.velocities);
+        let rate = source.rate_hz.map_or("-".into(), short);
+        writeln!(
+            out,
+            "{name:<22} {samples:>9} {rate:>8} {span:>17}  {:<8} {delay:<18} {}",
+            source.clock,
+            sigma.join(", ")
+        )?;
+        let paths: Vec<&str> = [&source.position, &source.velocity].into_iter().flatten().map(String::as_str).collect();
+        writeln!(out, "  {}", paths.join(", "))?;
+    }
+    if let Some(datum) = report.sources.iter().find(|s| s.datum) {
+        writeln!(out, "errors of the datum itself ({}) can't be seen by anyone: they pass into the track 1:1", datum.name)?;
+    }
+    if !report.unused_topics.is_empty() {
+        writeln!(out, "not used: {}", report.unused_topics.join(", "))?;
+    }
+    Ok(())
+}
+
+fn phases(out: &mut String, report: &Report) -> fmt::Result {
+    writeln!(
+        out,
+        "{:<34} {:>17} {:>8}   {:<21} 1 sigma of the track",
+        "phase", "from .. to s", "points", "rmse to the samples"
+    )?;
+    for phase in &report.phases {
+        let name = if phase.sources.is_empty() {
+            phase.phase.clone()
+        } else {
+            format!("{}: {}", phase.phase, phase.sources.join(" + "))
+        };
+        let span = format!("{:.2} .. {:.2}", phase.span_s.0, phase.span_s.1);
+        let rmse = |v: Option<f64>, unit: &str| v.map_or("-".into(), |v| format!("{v:.3} {unit}"));
+        let rmse = match (phase.position_rmse_m, phase.velocity_rmse_m_s) {
+            (None, None) => "-".to_owned(),
+            (p, v) => format!("{}, {}", rmse(p, "m"), rmse(v, "m/s")),
+        };
+        writeln!(
+            out,
+            "{name:<34} {span:>17} {:>8}   {rmse:<21} {:.3} m, {:.3} m/s",
+            phase.points, phase.position_sigma_m, phase.velocity_sigma_m_s
+        )?;
+    }
+    Ok(())
+}
+
+fn events(out: &mut String, report: &Report) -> fmt::Result {
+    writeln!(out, "{:<34} {:>20} {:>12} {:>24}   phase", "characteristic point", "time s", "z m", "vertical speed m/s")?;
+    for event in &report.characteristic_points {
+        let time = event
+            .time_sigma_s
+            .map_or(format!("{:.3}", event.time_s), |s| format!("{:.3} ± {s:.3}", event.time_s));
+        let speed = format!("{:.2} ± {:.2}", event.velocity_m_s[2], event.velocity_sigma_m_s[2]);
+        writeln!(out, "{:<34} {time:>20} {:>12.2} {speed:>24}   {}", event.name, event.position_m[2], event.phase)?;
+    }
+    Ok(())
+}
+
+/// A number without needless digits.
+fn short(v: f64) -> String {
+    let text = format!("{v:.2}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
