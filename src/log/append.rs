@@ -274,6 +274,7 @@ impl Chunk {
 mod tests {
     use std::fs;
 
+    use super::super::file::parse;
     use super::super::fixture::{PRIVATE, chunked, log, names_in, on_disk, records};
     use super::*;
 
@@ -310,7 +311,8 @@ mod tests {
         let log = Log::open(&path).unwrap();
         let out = dir.path().join("out.mcap");
         fs::write(&out, "precious").unwrap();
-        let refused = append(&log, &out, false, Compression::Zstd).unwrap_err();
+        // At the start, not after an hour of copying.
+        let refused = Appender::begin(&log, &out, false, &[], Compression::Zstd).unwrap_err();
         assert!(matches!(refused, LogError::OutputExists { .. }) && refused.hint().is_some(), "{refused}");
         assert_eq!(fs::read(&out).unwrap(), b"precious");
         assert_eq!(names_in(dir.path()), ["in.mcap", "out.mcap"]);
@@ -383,6 +385,35 @@ mod tests {
             assert!(chunk.uncompressed_size <= CHUNK_BYTES as u64, "{chunk:?}");
             assert!(chunk.message_end_time - chunk.message_start_time <= CHUNK_NS, "{chunk:?}");
         }
+    }
+
+    #[test]
+    fn every_entry_of_a_new_message_index_leads_to_its_message() {
+        let (dir, path) = on_disk(&log(chunked()));
+        let log = Log::open(&path).unwrap();
+        let out = dir.path().join("out.mcap");
+        let channels = [channel("/x"), channel("/y")];
+        let mut appender = Appender::begin(&log, &out, false, &channels, Compression::None).unwrap();
+        for i in 0..40 {
+            // Not in the order of time, as messages of several channels may come.
+            appender.write(NewMessage { channel: i % 2, time_ns: (i as u64 * 7) % 40, data: b"{}" }).unwrap();
+        }
+        appender.finish().unwrap();
+        let (output, written) = (fs::read(&out).unwrap(), Log::open(&out).unwrap());
+        let chunk = written.index().chunks.last().unwrap();
+        let content = &output[chunk.compressed_data_offset().unwrap() as usize..];
+        let mut entries = 0;
+        for (&channel_id, &at) in &chunk.message_index_offsets {
+            let index: MessageIndex = parse(&output[at as usize + 9..]).unwrap();
+            assert!(index.records.is_sorted_by_key(|entry| entry.log_time));
+            for entry in index.records {
+                let message: MessageHeader = parse(&content[entry.offset as usize + 9..]).unwrap();
+                assert_eq!(content[entry.offset as usize], op::MESSAGE);
+                assert_eq!((message.channel_id, message.log_time), (channel_id, entry.log_time));
+                entries += 1;
+            }
+        }
+        assert_eq!(entries, 40);
     }
 
     #[test]

@@ -7,7 +7,7 @@ use mcap::records::{
     op,
 };
 
-use super::file::{HEAD_LEN, Head, LogFile, MEMORY_LIMIT, parse};
+use super::file::{HEAD_LEN, Head, LogFile, parse};
 use super::{LogError, Obstacle, chunk, survey};
 
 const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
@@ -70,7 +70,7 @@ pub struct Index {
     pub attachments: Vec<AttachmentIndex>,
     /// In file order.
     pub metadata: Vec<MetadataIndex>,
-    /// Counts and times, of the summary or counted; `None` only where a scan was not possible.
+    /// Counts and times as the summary has them, or counted where it has none.
     pub statistics: Option<Statistics>,
     /// Where the first record after the header stands.
     pub data_start: u64,
@@ -285,7 +285,6 @@ pub(super) fn read_record<T>(file: &LogFile, head: Head, what: &'static str) -> 
 where
     T: for<'a> binrw::BinRead<Args<'a> = ()>,
 {
-    debug_assert!(head.body_len <= MEMORY_LIMIT);
     file.parse(head.offset, what, &file.bytes(head.body(), head.body_len, what)?)
 }
 
