@@ -3,6 +3,9 @@
 //! What is in a file is found here by a walk over raw records and by the mcap crate, never by the
 //! reader under test. `independent_reader.py` beside this file does the same with another library.
 
+// Helpers of tests, which the exception in clippy.toml doesn't reach.
+#![allow(clippy::unwrap_used)]
+
 use std::{
     collections::{BTreeMap, BTreeSet},
     fs,
@@ -19,7 +22,7 @@ const DATA_END: u8 = 0x0f;
 const MESSAGE: u8 = 0x05;
 const CHUNK: u8 = 0x06;
 
-/// Opcode and whole bytes of every record up to and with DataEnd, those of chunks in their place.
+/// Opcode and whole bytes of every record up to and with `DataEnd`, those of chunks in their place.
 fn raw_records(file: &[u8]) -> Vec<(u8, Vec<u8>)> {
     let mut found = Vec::new();
     let mut rest = &file[8..];
@@ -146,9 +149,10 @@ fn test_data() -> Option<PathBuf> {
 
 /// Appends to `path` and holds the output against the input. The answer is what forbade it, if anything.
 fn check_round_trip(path: &Path, compression: Compression, dir: &Path) -> Option<LogError> {
+    let name = path.display();
     let input = fs::read(path).unwrap();
     let out = dir.join("out.mcap");
-    let log = Log::open(path).unwrap_or_else(|e| panic!("{path:?}: {e}"));
+    let log = Log::open(path).unwrap_or_else(|e| panic!("{name}: {e}"));
 
     let channels = log.index().channels.keys().copied().collect();
     let mut ours = Vec::new();
@@ -159,21 +163,21 @@ fn check_round_trip(path: &Path, compression: Compression, dir: &Path) -> Option
     })
     .unwrap();
     let old = told_by_stream(&input);
-    assert_eq!(ours, old, "{path:?}");
+    assert_eq!(ours, old, "{name}");
 
     if let Err(refused) = append(&log, &out, compression, false) {
-        assert_eq!(names_in(dir).len(), 0, "{path:?} left something behind");
+        assert_eq!(names_in(dir).len(), 0, "{name} left something behind");
         return Some(refused);
     }
     let output = fs::read(&out).unwrap();
     let data_end = log.index().data_end as usize;
-    assert!(output[..data_end] == input[..data_end], "{path:?}: the data section changed");
+    assert!(output[..data_end] == input[..data_end], "{name}: the data section changed");
 
     // Every old record, one after the other, then ours.
     let (old_records, new_records) = (raw_records(&input), raw_records(&output));
     let kept = old_records.len() - 1;
-    assert!(new_records[..kept] == old_records[..kept], "{path:?}: records changed");
-    assert_eq!(new_records[kept..].iter().filter(|(opcode, _)| *opcode == MESSAGE).count(), 3, "{path:?}");
+    assert!(new_records[..kept] == old_records[..kept], "{name}: records changed");
+    assert_eq!(new_records[kept..].iter().filter(|(opcode, _)| *opcode == MESSAGE).count(), 3, "{name}");
 
     // Every old summary record, wherever it stands now.
     let new_summary = &output[summary_start(&output)..];
@@ -184,7 +188,7 @@ fn check_round_trip(path: &Path, compression: Compression, dir: &Path) -> Option
             let remade = matches!(record[0], 0x0b | 0x0e);
             assert!(
                 remade || new_summary.windows(record.len()).any(|window| window == record),
-                "{path:?}: summary record {:#04x} is gone",
+                "{name}: summary record {:#04x} is gone",
                 record[0]
             );
             rest = &rest[record.len()..];
@@ -195,9 +199,9 @@ fn check_round_trip(path: &Path, compression: Compression, dir: &Path) -> Option
     let old_crc = u32_at(&input, data_end + HEAD);
     let new_end = summary_start(&output) - 13;
     let expected = if old_crc == 0 { 0 } else { crc32fast::hash(&output[..new_end]) };
-    assert_eq!(u32_at(&output, new_end + HEAD), expected, "{path:?}: data section CRC");
+    assert_eq!(u32_at(&output, new_end + HEAD), expected, "{name}: data section CRC");
     let end = output.len() - 12;
-    assert_eq!(u32_at(&output, end), crc32fast::hash(&output[summary_start(&output)..end]), "{path:?}");
+    assert_eq!(u32_at(&output, end), crc32fast::hash(&output[summary_start(&output)..end]), "{name}");
 
     // Messages, by both kinds of reader.
     let mut expected = old;
@@ -205,18 +209,18 @@ fn check_round_trip(path: &Path, compression: Compression, dir: &Path) -> Option
         let time = 1_000 + i;
         expected.push((TOPIC.to_owned(), i as u32, time, time, format!("{{\"i\":{i}}}").into_bytes()));
     }
-    assert_eq!(told_by_stream(&output), expected, "{path:?}");
+    assert_eq!(told_by_stream(&output), expected, "{name}");
     expected.sort();
-    assert_eq!(told_by_index(&output), expected, "{path:?}: through the index");
+    assert_eq!(told_by_index(&output), expected, "{name}: through the index");
 
     let summary = mcap::Summary::read(&output).unwrap().unwrap();
     let statistics = summary.stats.as_ref().unwrap();
-    assert_eq!(statistics.message_count, expected.len() as u64, "{path:?}");
-    assert_eq!(statistics.channel_count as usize, summary.channels.len(), "{path:?}");
-    assert_eq!(statistics.schema_count as usize, summary.schemas.len(), "{path:?}");
-    assert_eq!(statistics.chunk_count as usize, summary.chunk_indexes.len(), "{path:?}");
-    assert_eq!(statistics.attachment_count as usize, summary.attachment_indexes.len(), "{path:?}");
-    assert_eq!(statistics.metadata_count as usize, summary.metadata_indexes.len(), "{path:?}");
+    assert_eq!(statistics.message_count, expected.len() as u64, "{name}");
+    assert_eq!(statistics.channel_count as usize, summary.channels.len(), "{name}");
+    assert_eq!(statistics.schema_count as usize, summary.schemas.len(), "{name}");
+    assert_eq!(statistics.chunk_count as usize, summary.chunk_indexes.len(), "{name}");
+    assert_eq!(statistics.attachment_count as usize, summary.attachment_indexes.len(), "{name}");
+    assert_eq!(statistics.metadata_count as usize, summary.metadata_indexes.len(), "{name}");
     for attachment in &summary.attachment_indexes {
         mcap::read::attachment(&output, attachment).unwrap();
     }
@@ -260,5 +264,6 @@ fn every_test_log_keeps_its_bytes_and_messages_or_is_refused_with_a_reason() {
         }
     }
     println!("{kept} logs round-trip, refused: {refused:?}");
-    assert!(kept >= 1 && kept + refused.values().sum::<usize>() == logs.len());
+    // What round-tripped when this was written; a log that is refused must not become more common.
+    assert!(kept >= 255, "only {kept} of {} logs round-trip", logs.len());
 }

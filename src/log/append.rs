@@ -2,7 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    io::{self, Write},
+    io,
     path::{Path, PathBuf},
 };
 
@@ -11,6 +11,7 @@ use mcap::records::{
     SchemaHeader, Statistics, op,
 };
 
+use super::addition::{Compression, NewChannel, NewMessage, NewMetadata};
 use super::ids::{Ids, assign_ids};
 use super::index::SummaryRecord;
 use super::output::{Sink, check_output};
@@ -22,93 +23,6 @@ use super::{Index, Log, LogError};
 const CHUNK_BYTES: usize = 4_000_000;
 /// And at most this much log time.
 const CHUNK_NS: u64 = 30_000_000_000;
-
-/// A channel to be added.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct NewChannel {
-    /// Its name, new to the log.
-    pub topic: String,
-    /// Such as `json`.
-    pub message_encoding: String,
-    /// Such as `trackfuse.TrackPoint`.
-    pub schema_name: String,
-    /// Such as `jsonschema`.
-    pub schema_encoding: String,
-    /// The definition itself. Channels with the same name, encoding and definition share a schema.
-    pub schema: Vec<u8>,
-    /// For people and other programs.
-    pub metadata: BTreeMap<String, String>,
-}
-
-impl NewChannel {
-    /// A channel of JSON messages that follow a JSON Schema.
-    #[must_use]
-    pub fn json(topic: &str, schema_name: &str, schema: &str) -> Self {
-        Self {
-            topic: topic.to_owned(),
-            message_encoding: "json".to_owned(),
-            schema_name: schema_name.to_owned(),
-            schema_encoding: "jsonschema".to_owned(),
-            schema: schema.as_bytes().to_vec(),
-            metadata: BTreeMap::new(),
-        }
-    }
-}
-
-/// A message to be added.
-#[derive(Clone, Copy, Debug)]
-pub struct NewMessage<'a> {
-    /// Which of the new channels, counted from 0.
-    pub channel: usize,
-    /// Both its log time and its publish time, in ns.
-    pub time_ns: u64,
-    /// The payload, in the channel's encoding.
-    pub data: &'a [u8],
-}
-
-/// A metadata record to be added. Some tools refuse a name that is in a log twice.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct NewMetadata {
-    /// Its name.
-    pub name: String,
-    /// Its content.
-    pub entries: BTreeMap<String, String>,
-}
-
-/// How new chunks are compressed; old ones stay as they are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Compression {
-    /// Small, and fast to read.
-    #[default]
-    Zstd,
-    /// Larger, and faster still.
-    Lz4,
-    /// As the messages are.
-    None,
-}
-
-impl Compression {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Zstd => "zstd",
-            Self::Lz4 => "lz4",
-            Self::None => "",
-        }
-    }
-
-    fn compress(self, bytes: &[u8]) -> io::Result<Vec<u8>> {
-        match self {
-            Self::Zstd => zstd::bulk::compress(bytes, zstd::DEFAULT_COMPRESSION_LEVEL),
-            Self::Lz4 => {
-                let mut encoder = lz4::EncoderBuilder::new().build(Vec::new())?;
-                encoder.write_all(bytes)?;
-                let (compressed, finished) = encoder.finish();
-                finished.map(|()| compressed)
-            }
-            Self::None => Ok(bytes.to_vec()),
-        }
-    }
-}
 
 /// What was written.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -261,7 +175,7 @@ impl<'a> Appender<'a> {
         );
         self.put(&record)?;
         self.summarize(op::CHANNEL, record);
-        self.statistics.channel_count += 1;
+        self.statistics.channel_count = self.statistics.channel_count.saturating_add(1);
         self.channels.push((ids.channel, 0));
         Ok(())
     }
@@ -353,5 +267,176 @@ impl Chunk {
         let entry = MessageIndexEntry { log_time: time, offset: self.records.len() as u64 };
         self.index.entry(header.channel_id).or_default().push(entry);
         self.records.extend_from_slice(record);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::super::file::parse;
+    use super::super::fixture::{PRIVATE, chunked, log, names_in, on_disk, records};
+    use super::*;
+
+    fn channel(topic: &str) -> NewChannel {
+        NewChannel::json(topic, "trackfuse.Test", "{}")
+    }
+
+    fn append(log: &Log, out: &Path, force: bool, compression: Compression) -> Result<Written, LogError> {
+        let mut appender = Appender::begin(log, out, force, &[channel("/fused/track")], compression)?;
+        for i in 0..100_u64 {
+            let data = i.to_string();
+            appender.write(NewMessage { channel: 0, time_ns: i * 1_000_000_000, data: data.as_bytes() })?;
+        }
+        appender.finish()
+    }
+
+    #[test]
+    fn the_same_input_gives_the_same_bytes() {
+        let (dir, path) = on_disk(&log(chunked()));
+        let log = Log::open(&path).unwrap();
+        for compression in [Compression::Zstd, Compression::Lz4, Compression::None] {
+            let outs = ["1", "2"].map(|name| dir.path().join(name));
+            let [a, b] = outs.map(|out| {
+                append(&log, &out, true, compression).unwrap();
+                fs::read(out).unwrap()
+            });
+            assert!(a == b, "{compression:?}");
+        }
+    }
+
+    #[test]
+    fn an_existing_output_is_refused_and_kept_unless_forced() {
+        let (dir, path) = on_disk(&log(chunked()));
+        let log = Log::open(&path).unwrap();
+        let out = dir.path().join("out.mcap");
+        fs::write(&out, "precious").unwrap();
+        // At the start, not after an hour of copying.
+        let refused = Appender::begin(&log, &out, false, &[], Compression::Zstd).unwrap_err();
+        assert!(matches!(refused, LogError::OutputExists { .. }) && refused.hint().is_some(), "{refused}");
+        assert_eq!(fs::read(&out).unwrap(), b"precious");
+        assert_eq!(names_in(dir.path()), ["in.mcap", "out.mcap"]);
+        let written = append(&log, &out, true, Compression::Zstd).unwrap();
+        assert_eq!((written.len, written.messages), (fs::metadata(&out).unwrap().len(), 100));
+    }
+
+    #[test]
+    fn an_output_made_by_another_meanwhile_is_kept() {
+        let (dir, path) = on_disk(&log(chunked()));
+        let log = Log::open(&path).unwrap();
+        let out = dir.path().join("out.mcap");
+        let appender = Appender::begin(&log, &out, false, &[], Compression::Zstd).unwrap();
+        fs::write(&out, "precious").unwrap();
+        assert!(matches!(appender.finish(), Err(LogError::OutputExists { .. })));
+        assert_eq!(fs::read(&out).unwrap(), b"precious");
+        assert_eq!(names_in(dir.path()), ["in.mcap", "out.mcap"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn the_input_is_never_the_output_through_any_link() {
+        let (dir, path) = on_disk(&log(chunked()));
+        let log = Log::open(&path).unwrap();
+        let [soft, hard] = ["soft", "hard"].map(|name| dir.path().join(name));
+        std::os::unix::fs::symlink(&path, &soft).unwrap();
+        fs::hard_link(&path, &hard).unwrap();
+        for out in [&path, &soft, &hard] {
+            let refused = append(&log, out, true, Compression::Zstd);
+            assert!(matches!(refused, Err(LogError::OutputIsInput { .. })), "{out:?}: {refused:?}");
+        }
+        assert_eq!(names_in(dir.path()), ["hard", "in.mcap", "soft"]);
+    }
+
+    #[test]
+    fn nothing_remains_of_an_output_that_was_not_finished() {
+        let (dir, path) = on_disk(&log(chunked()));
+        let log = Log::open(&path).unwrap();
+        let out = dir.path().join("out.mcap");
+        let begin = |out: &Path, channels: &[NewChannel]| {
+            Appender::begin(&log, out, false, channels, Compression::Zstd)
+        };
+        let mut given_up = begin(&out, &[channel("/x")]).unwrap();
+        given_up.write(NewMessage { channel: 0, time_ns: 1, data: b"1" }).unwrap();
+        drop(given_up);
+        assert!(matches!(begin(&out, &[channel("/a")]), Err(LogError::TopicTaken { .. })));
+        assert!(matches!(begin(&out, &[channel("/x"), channel("/x")]), Err(LogError::TopicTaken { .. })));
+        assert!(matches!(begin(&dir.path().join("no/such"), &[]), Err(LogError::Write { .. })));
+        assert_eq!(names_in(dir.path()), ["in.mcap"]);
+    }
+
+    #[test]
+    fn new_chunks_are_short_in_time_and_small() {
+        let (dir, path) = on_disk(&log(chunked()));
+        let log = Log::open(&path).unwrap();
+        let out = dir.path().join("out.mcap");
+        let mut appender = Appender::begin(&log, &out, false, &[channel("/x")], Compression::Zstd).unwrap();
+        let large = vec![b' '; 1_500_000];
+        for i in 0..100_u64 {
+            let data: &[u8] = if i < 10 { &large } else { b"1" };
+            appender.write(NewMessage { channel: 0, time_ns: i * 1_000_000_000, data }).unwrap();
+        }
+        appender.finish().unwrap();
+        let written = Log::open(&out).unwrap();
+        let (old, new) = written.index().chunks.split_at(log.index().chunks.len());
+        assert_eq!(old, log.index().chunks);
+        // Two of the large ones fit into one chunk, and 31 of the small ones into 30 s.
+        assert_eq!(new.len(), 7);
+        for chunk in new {
+            assert!(chunk.uncompressed_size <= CHUNK_BYTES as u64, "{chunk:?}");
+            assert!(chunk.message_end_time - chunk.message_start_time <= CHUNK_NS, "{chunk:?}");
+        }
+    }
+
+    #[test]
+    fn every_entry_of_a_new_message_index_leads_to_its_message() {
+        let (dir, path) = on_disk(&log(chunked()));
+        let log = Log::open(&path).unwrap();
+        let out = dir.path().join("out.mcap");
+        let channels = [channel("/x"), channel("/y")];
+        let mut appender = Appender::begin(&log, &out, false, &channels, Compression::None).unwrap();
+        for i in 0..40 {
+            // Not in the order of time, as messages of several channels may come.
+            appender.write(NewMessage { channel: i % 2, time_ns: (i as u64 * 7) % 40, data: b"{}" }).unwrap();
+        }
+        appender.finish().unwrap();
+        let (output, written) = (fs::read(&out).unwrap(), Log::open(&out).unwrap());
+        let chunk = written.index().chunks.last().unwrap();
+        let content = &output[chunk.compressed_data_offset().unwrap() as usize..];
+        let mut entries = 0;
+        for (&channel_id, &at) in &chunk.message_index_offsets {
+            let index: MessageIndex = parse(&output[at as usize + 9..]).unwrap();
+            assert!(index.records.is_sorted_by_key(|entry| entry.log_time));
+            for entry in index.records {
+                let message: MessageHeader = parse(&content[entry.offset as usize + 9..]).unwrap();
+                assert_eq!(content[entry.offset as usize], op::MESSAGE);
+                assert_eq!((message.channel_id, message.log_time), (channel_id, entry.log_time));
+                entries += 1;
+            }
+        }
+        assert_eq!(entries, 40);
+    }
+
+    #[test]
+    fn records_of_others_and_a_missing_crc_stay_as_they_are() {
+        let mut bytes = log(chunked().calculate_data_section_crc(false).calculate_summary_section_crc(false));
+        // A record of somebody's own in the summary too, in place of the summary offsets.
+        let (_, offsets) =
+            records(&bytes).into_iter().find(|&(opcode, _)| opcode == op::SUMMARY_OFFSET).unwrap();
+        let private = encode_bytes(PRIVATE + 1, &[b"in the summary"]);
+        bytes.splice(offsets..offsets, private.iter().copied());
+        let offset_start = bytes.len() - 8 - 12;
+        bytes[offset_start..offset_start + 8]
+            .copy_from_slice(&((offsets + private.len()) as u64).to_le_bytes());
+
+        let (dir, path) = on_disk(&bytes);
+        let log = Log::open(&path).unwrap();
+        let out = dir.path().join("out.mcap");
+        append(&log, &out, false, Compression::Zstd).unwrap();
+        let output = fs::read(&out).unwrap();
+        let found = records(&output);
+        assert!(found.iter().any(|&(opcode, _)| opcode == PRIVATE));
+        let &(_, at) = found.iter().find(|&&(opcode, _)| opcode == PRIVATE + 1).unwrap();
+        assert_eq!(output[at..at + private.len()], private);
+        assert_eq!(Log::open(&out).unwrap().index().data_section_crc, None);
     }
 }

@@ -45,3 +45,24 @@ fn free_ids(used: BTreeSet<u16>, lowest: u16) -> impl Iterator<Item = u16> {
     let above = used.last().map_or(lowest, |&greatest| greatest.saturating_add(1).max(lowest));
     (above..=u16::MAX).chain(lowest..above).filter(move |id| !used.contains(id))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn new_ids_come_above_the_old_ones_while_there_is_room() {
+        assert_eq!(free_ids([].into(), 1).take(2).collect::<Vec<_>>(), [1, 2]);
+        assert_eq!(free_ids([].into(), 0).take(2).collect::<Vec<_>>(), [0, 1]);
+        assert_eq!(free_ids([0, 7].into(), 0).take(2).collect::<Vec<_>>(), [8, 9]);
+    }
+
+    #[test]
+    fn gaps_between_old_ids_are_used_before_giving_up() {
+        let used = (0..=u16::MAX).filter(|id| ![3, 9].contains(id)).collect();
+        assert_eq!(free_ids(used, 1).collect::<Vec<_>>(), [3, 9]);
+        let used = [u16::MAX - 1].into();
+        assert_eq!(free_ids(used, 1).take(3).collect::<Vec<_>>(), [u16::MAX, 1, 2]);
+        assert_eq!(free_ids((0..=u16::MAX).collect(), 0).next(), None);
+    }
+}

@@ -7,7 +7,7 @@ use mcap::records::{
     op,
 };
 
-use super::file::{HEAD_LEN, Head, LogFile, MEMORY_LIMIT, parse};
+use super::file::{HEAD_LEN, Head, LogFile, parse};
 use super::{LogError, Obstacle, chunk, survey};
 
 const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
@@ -15,7 +15,7 @@ const MAGIC_LEN: u64 = MAGIC.len() as u64;
 /// Summary start, summary offset start, CRC.
 const FOOTER_BODY_LEN: u64 = 8 + 8 + 4;
 const DATA_END_BODY_LEN: u64 = 4;
-/// DataEnd with its head, right before the summary.
+/// `DataEnd` with its head, right before the summary.
 const DATA_END_LEN: u64 = HEAD_LEN + DATA_END_BODY_LEN;
 
 /// How a channel's messages are made up.
@@ -70,15 +70,15 @@ pub struct Index {
     pub attachments: Vec<AttachmentIndex>,
     /// In file order.
     pub metadata: Vec<MetadataIndex>,
-    /// Counts and times, of the summary or counted; `None` only where a scan was not possible.
+    /// Counts and times as the summary has them, or counted where it has none.
     pub statistics: Option<Statistics>,
     /// Where the first record after the header stands.
     pub data_start: u64,
-    /// Where the DataEnd record stands: the bytes before it never change.
+    /// Where the `DataEnd` record stands: the bytes before it never change.
     pub data_end: u64,
     /// Where the summary begins, `None` where there is none.
     pub summary_start: Option<u64>,
-    /// CRC-32 of the bytes before DataEnd, `None` where the writer left it out.
+    /// CRC-32 of the bytes before `DataEnd`, `None` where the writer left it out.
     pub data_section_crc: Option<u32>,
     /// CRC-32 of the summary, `None` where the writer left it out.
     pub summary_crc: Option<u32>,
@@ -285,6 +285,148 @@ pub(super) fn read_record<T>(file: &LogFile, head: Head, what: &'static str) -> 
 where
     T: for<'a> binrw::BinRead<Args<'a> = ()>,
 {
-    debug_assert!(head.body_len <= MEMORY_LIMIT);
     file.parse(head.offset, what, &file.bytes(head.body(), head.body_len, what)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{collections::BTreeSet, panic::catch_unwind};
+
+    use super::super::fixture::{PRIVATE, chunked, log, on_disk, records, without_summary_crc};
+    use super::super::{Appender, Compression};
+    use super::*;
+
+    fn open(bytes: &[u8]) -> Result<Log, LogError> {
+        let (_dir, path) = on_disk(bytes);
+        Log::open(path)
+    }
+
+    /// Opens, reads and appends; what fails must do so with an error.
+    fn use_in_every_way(bytes: &[u8]) -> Result<(), LogError> {
+        let (dir, path) = on_disk(bytes);
+        let log = Log::open(path)?;
+        let channels: BTreeSet<u16> = (0..4).collect();
+        log.first_messages(&channels)?;
+        log.for_each_message(&channels, |_| Ok::<_, LogError>(()))?;
+        Appender::begin(&log, dir.path().join("out.mcap"), false, &[], Compression::None)?.finish()?;
+        Ok(())
+    }
+
+    #[test]
+    fn a_file_that_is_no_mcap_says_what_it_is() {
+        let not_mcap = |bytes: &[u8]| match open(bytes) {
+            Err(e @ LogError::NotMcap { .. }) => e.to_string(),
+            other => panic!("{other:?}"),
+        };
+        assert!(not_mcap(b"").ends_with("the file is empty"));
+        assert!(not_mcap(b"#ROSBAG V2.0\n").contains("#ROSBAG "), "{}", not_mcap(b"#ROSBAG V2.0\n"));
+        assert!(not_mcap(b"\x89MCAP9\r\n").contains("MCAP9"));
+        assert!(matches!(Log::open("/nowhere/at.all"), Err(LogError::Open { .. })));
+        assert!(matches!(Log::open("/"), Err(LogError::Open { .. })));
+    }
+
+    #[test]
+    fn a_log_cut_off_anywhere_is_refused() {
+        let bytes = log(chunked());
+        for len in 1..bytes.len() {
+            match open(&bytes[..len]) {
+                Err(LogError::CutOff { .. } | LogError::Damaged { .. }) => {}
+                other => panic!("cut at {len}: {other:?}"),
+            }
+        }
+        let Err(e @ LogError::CutOff { .. }) = open(&bytes[..bytes.len() / 2]) else { panic!("not cut off") };
+        assert!(e.hint().is_some());
+    }
+
+    #[test]
+    fn a_flipped_byte_in_the_summary_is_noticed_and_none_anywhere_panics() {
+        let bytes = log(chunked());
+        let summary_start = open(&bytes).unwrap().index().summary_start.unwrap() as usize;
+        for at in 0..bytes.len() {
+            let mut bytes = bytes.clone();
+            bytes[at] ^= 0xff;
+            let result = catch_unwind(|| use_in_every_way(&bytes)).unwrap();
+            let magic = bytes.len() - 8;
+            assert!(at < summary_start || at >= magic || result.is_err(), "byte {at}");
+        }
+    }
+
+    #[test]
+    fn a_length_beyond_the_file_is_an_error_wherever_it_stands() {
+        for (options, every) in
+            [(chunked(), 1), (chunked().use_chunks(false), 7), (chunked().emit_chunk_indexes(false), 7)]
+        {
+            let bytes = without_summary_crc(log(options));
+            for at in (8..bytes.len() - 16).step_by(every) {
+                for claim in [1_u64 << 62, 1 << 40] {
+                    let mut bytes = bytes.clone();
+                    bytes[at..at + 8].copy_from_slice(&claim.to_le_bytes());
+                    // Many of these hit a field that may hold anything; none may panic or abort.
+                    let _ = catch_unwind(|| use_in_every_way(&bytes)).unwrap();
+                }
+            }
+            for (opcode, at) in records(&bytes) {
+                let mut bytes = bytes.clone();
+                bytes[at + 1..at + 9].copy_from_slice(&(1_u64 << 62).to_le_bytes());
+                assert!(use_in_every_way(&bytes).is_err() || opcode == op::SUMMARY_OFFSET, "{opcode:#x}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_summary_that_leaves_things_out_is_completed() {
+        let whole = open(&log(chunked())).unwrap();
+        let bare = open(&log(chunked().emit_summary_records(false).emit_summary_offsets(false))).unwrap();
+        assert_eq!(bare.index().summary_start, None);
+        bare.ensure_appendable().unwrap();
+        let (found, expected) = (bare.index(), whole.index());
+        assert_eq!(found.schemas, expected.schemas);
+        assert_eq!(found.channels, expected.channels);
+        assert_eq!(found.chunks, expected.chunks);
+        assert_eq!(found.attachments, expected.attachments);
+        assert_eq!(found.metadata, expected.metadata);
+        assert_eq!(found.statistics, expected.statistics);
+    }
+
+    #[test]
+    fn messages_outside_chunks_can_be_read_but_forbid_new_channels() {
+        let log = open(&log(chunked().use_chunks(false))).unwrap();
+        let mut count = 0;
+        log.for_each_message(&log.index().channels.keys().copied().collect(), |_| {
+            count += 1;
+            Ok::<_, LogError>(())
+        })
+        .unwrap();
+        assert_eq!(count, 20);
+        let refused = log.ensure_appendable().unwrap_err();
+        assert!(
+            matches!(refused, LogError::NotAppendable { obstacle: Obstacle::LooseMessages { .. }, .. }),
+            "{refused}"
+        );
+        assert!(refused.hint().unwrap().contains("--sidecar"));
+    }
+
+    #[test]
+    fn bytes_that_are_no_record_forbid_new_channels_but_not_reading() {
+        let mut bytes = log(chunked());
+        let (_, private) = records(&bytes).into_iter().find(|(opcode, _)| *opcode == PRIVATE).unwrap();
+        bytes[private] = 0;
+        let log = open(&bytes).unwrap();
+        let refused = log.ensure_appendable().unwrap_err();
+        assert!(
+            matches!(refused, LogError::NotAppendable { obstacle: Obstacle::Garbage { offset }, .. } if offset == private as u64),
+            "{refused}"
+        );
+        assert_eq!(log.first_messages(&[1, 2].into()).unwrap().len(), 2);
+    }
+
+    #[test]
+    fn a_chunk_indexed_twice_is_damage() {
+        let log_file = open(&log(chunked())).unwrap();
+        let mut index = log_file.index().clone();
+        index.chunks.push(index.chunks[0].clone());
+        let (_dir, path) = on_disk(&log(chunked()));
+        let file = LogFile::open(&path).unwrap();
+        assert!(matches!(survey::complete(&file, &mut index), Err(LogError::Damaged { .. })));
+    }
 }

@@ -111,3 +111,82 @@ fn message<'a>(file: &LogFile, block: &chunk::Block<'_>, body: &'a [u8]) -> Resu
         data: body.get(MESSAGE_HEADER_LEN..).unwrap_or_default(),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::super::fixture::{chunked, log, on_disk};
+    use super::*;
+
+    fn times(log: &Log, channel: u16) -> Result<Vec<u64>, LogError> {
+        let mut times = Vec::new();
+        log.for_each_message(&[channel].into(), |message| {
+            times.push(message.log_time / 1_000_000_000);
+            Ok::<_, LogError>(())
+        })?;
+        Ok(times)
+    }
+
+    #[test]
+    fn only_the_wanted_channel_is_handed_on() {
+        for compression in [None, Some(mcap::Compression::Zstd), Some(mcap::Compression::Lz4)] {
+            let (_dir, path) = on_disk(&log(chunked().compression(compression)));
+            let log = Log::open(&path).unwrap();
+            assert_eq!(times(&log, 2).unwrap(), [11, 13, 15, 17, 19]);
+            assert!(times(&log, 9).unwrap().is_empty());
+            let first = log.first_messages(&[1, 2, 9].into()).unwrap();
+            assert_eq!(first.keys().copied().collect::<Vec<_>>(), [1, 2]);
+            assert_eq!(first[&2].data, b"{\"i\":11}");
+            assert_eq!(first[&2].publish_time, 11_000_000_001);
+        }
+    }
+
+    #[test]
+    fn a_chunk_with_a_wrong_crc_is_named_and_others_stay_readable() {
+        let (_dir, path) = on_disk(&log(chunked()));
+        let offset = Log::open(&path).unwrap().index().chunks[0].chunk_start_offset;
+        let mut bytes = fs::read(&path).unwrap();
+        let payload = bytes.windows(7).position(|window| window == b"{\"i\":0}").unwrap();
+        bytes[payload + 5] = b'7';
+        fs::write(&path, &bytes).unwrap();
+        let log = Log::open(&path).unwrap();
+        match times(&log, 1) {
+            Err(LogError::Damaged { offset: at, what, .. }) => {
+                assert_eq!(at, offset);
+                assert!(what.contains("CRC"), "{what}");
+            }
+            other => panic!("{other:?}"),
+        }
+        // `/b` is in later chunks only, so the bad one isn't even read.
+        assert_eq!(times(&log, 2).unwrap().len(), 5);
+    }
+
+    #[test]
+    fn a_chunk_that_holds_other_than_it_claims_is_an_error() {
+        let bytes = log(chunked().compression(Some(mcap::Compression::Zstd)));
+        let (_dir, path) = on_disk(&bytes);
+        let at = Log::open(&path).unwrap().index().chunks[0].chunk_start_offset as usize + 9 + 16;
+        let size = u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
+        for (claim, expected) in
+            [(size - 1, "more than"), (size + 1, "less than"), (1 << 44, "more than the limit")]
+        {
+            let mut bytes = bytes.clone();
+            bytes[at..at + 8].copy_from_slice(&claim.to_le_bytes());
+            fs::write(&path, &bytes).unwrap();
+            let error = times(&Log::open(&path).unwrap(), 1).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+    }
+
+    #[test]
+    fn an_unknown_compression_is_named() {
+        let mut bytes = log(chunked().compression(Some(mcap::Compression::Lz4)));
+        while let Some(at) = bytes.windows(3).position(|window| window == b"lz4") {
+            bytes[at..at + 3].copy_from_slice(b"xyz");
+        }
+        let (_dir, path) = on_disk(&super::super::fixture::without_summary_crc(bytes));
+        let error = times(&Log::open(&path).unwrap(), 1).unwrap_err();
+        assert!(matches!(&error, LogError::UnknownCompression { name, .. } if name == "xyz"), "{error}");
+    }
+}

@@ -13,11 +13,14 @@
 //! Nothing that a file claims is believed before it is checked: lengths against the file before
 //! memory is taken, checksums before content is handed on.
 
+mod addition;
 mod append;
 mod chunk;
 pub mod decode;
 mod error;
 mod file;
+#[cfg(test)]
+mod fixture;
 mod ids;
 mod index;
 mod messages;
@@ -25,7 +28,8 @@ mod output;
 mod summary;
 mod survey;
 
-pub use append::{Appender, Compression, NewChannel, NewMessage, NewMetadata, Written};
+pub use addition::{Compression, NewChannel, NewMessage, NewMetadata};
+pub use append::{Appender, Written};
 pub use error::{LogError, Obstacle};
 pub use index::{Index, Log, Schema};
 pub use mcap::records::{AttachmentIndex, Channel, ChunkIndex, MetadataIndex, Statistics};

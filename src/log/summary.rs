@@ -39,7 +39,7 @@ where
     body
 }
 
-/// Everything behind DataEnd: summary, summary offsets, footer, magic.
+/// Everything behind `DataEnd`: summary, summary offsets, footer, magic.
 ///
 /// `start` is where it will stand, `statistics` count old and new together.
 pub(super) fn tail(old: &Index, new: &[SummaryRecord], statistics: &Statistics, start: u64) -> Vec<u8> {

@@ -64,13 +64,13 @@ fn check_extents(file: &LogFile, index: &Index) -> Result<Vec<Range<u64>>, LogEr
     let mut extents = Vec::new();
     for (opcode, what, offset, len, behind) in chunks.chain(attachments).chain(metadata) {
         let end = offset.checked_add(len).and_then(|end| end.checked_add(behind));
-        let Some(end) = end.filter(|&end| offset >= index.data_start && end <= index.data_end) else {
+        if end.is_none_or(|end| offset < index.data_start || end > index.data_end) {
             let what = format!(
                 "the {what} index says {len} + {behind} bytes stand here, outside the data section [{}, {})",
                 index.data_start, index.data_end
             );
             return Err(file.damaged(offset, what));
-        };
+        }
         let head = file.head(offset, index.data_end)?;
         if head.opcode != opcode || head.end() != offset + len {
             let found = head.end() - offset;
@@ -80,7 +80,8 @@ fn check_extents(file: &LogFile, index: &Index) -> Result<Vec<Range<u64>>, LogEr
             );
             return Err(file.damaged(offset, what));
         }
-        extents.push(offset..end);
+        // Message indexes behind a chunk are walked like a gap: something else may stand among them.
+        extents.push(offset..head.end());
     }
     for chunk in &index.chunks {
         let chunk_end = chunk.chunk_start_offset + chunk.chunk_length;
@@ -122,19 +123,16 @@ impl Gaps<'_> {
                 self.garbage.get_or_insert(position);
                 break;
             };
-            match (head.opcode, &mut chunk) {
-                (op::MESSAGE_INDEX, Some(chunk)) => {
-                    let id = self.file.bytes(head.body(), head.body_len.min(2), "a message index")?;
-                    let id: u16 = self.file.parse(position, "message index", &id)?;
-                    chunk.message_index_offsets.insert(id, position);
-                    chunk.message_index_length += head.end() - position;
-                }
-                _ => {
-                    self.add_chunk(chunk.take())?;
-                    if self.record(head, &mut chunk)? {
-                        self.garbage.get_or_insert(position);
-                        break;
-                    }
+            if let (op::MESSAGE_INDEX, Some(chunk)) = (head.opcode, &mut chunk) {
+                let id = self.file.bytes(head.body(), head.body_len.min(2), "a message index")?;
+                let id: u16 = self.file.parse(position, "message index", &id)?;
+                chunk.message_index_offsets.insert(id, position);
+                chunk.message_index_length += head.end() - position;
+            } else {
+                self.add_chunk(chunk.take())?;
+                if self.record(head, &mut chunk)? {
+                    self.garbage.get_or_insert(position);
+                    break;
                 }
             }
             position = head.end();
@@ -193,7 +191,7 @@ impl Gaps<'_> {
     fn add_loose(&mut self, head: Head) {
         match self.index.loose.last_mut() {
             Some(run) if run.end == head.offset && head.end() - run.start <= LOOSE_PIECE => {
-                run.end = head.end()
+                run.end = head.end();
             }
             _ => self.index.loose.push(head.offset..head.end()),
         }
@@ -300,8 +298,10 @@ pub(super) fn count(statistics: &mut Statistics, message: &MessageHeader) {
     };
     statistics.message_start_time = start;
     statistics.message_end_time = end;
-    statistics.message_count += 1;
-    *statistics.channel_message_counts.entry(message.channel_id).or_default() += 1;
+    // Saturating, since old counts may be anything.
+    statistics.message_count = statistics.message_count.saturating_add(1);
+    let counted = statistics.channel_message_counts.entry(message.channel_id).or_default();
+    *counted = counted.saturating_add(1);
 }
 
 /// The first chunk that holds messages and no message index. Only chunks without one are read.

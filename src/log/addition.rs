@@ -1,0 +1,93 @@
+//! What is added to a log: channels, messages, metadata, and how they are packed.
+
+use std::{
+    collections::BTreeMap,
+    io::{self, Write},
+};
+
+/// A channel to be added.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NewChannel {
+    /// Its name, new to the log.
+    pub topic: String,
+    /// Such as `json`.
+    pub message_encoding: String,
+    /// Such as `trackfuse.TrackPoint`.
+    pub schema_name: String,
+    /// Such as `jsonschema`.
+    pub schema_encoding: String,
+    /// The definition itself. Channels with the same name, encoding and definition share a schema.
+    pub schema: Vec<u8>,
+    /// For people and other programs.
+    pub metadata: BTreeMap<String, String>,
+}
+
+impl NewChannel {
+    /// A channel of JSON messages that follow a JSON Schema.
+    #[must_use]
+    pub fn json(topic: &str, schema_name: &str, schema: &str) -> Self {
+        Self {
+            topic: topic.to_owned(),
+            message_encoding: "json".to_owned(),
+            schema_name: schema_name.to_owned(),
+            schema_encoding: "jsonschema".to_owned(),
+            schema: schema.as_bytes().to_vec(),
+            metadata: BTreeMap::new(),
+        }
+    }
+}
+
+/// A message to be added.
+#[derive(Clone, Copy, Debug)]
+pub struct NewMessage<'a> {
+    /// Which of the new channels, counted from 0.
+    pub channel: usize,
+    /// Both its log time and its publish time, in ns.
+    pub time_ns: u64,
+    /// The payload, in the channel's encoding.
+    pub data: &'a [u8],
+}
+
+/// A metadata record to be added. Some tools refuse a name that is in a log twice.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NewMetadata {
+    /// Its name.
+    pub name: String,
+    /// Its content.
+    pub entries: BTreeMap<String, String>,
+}
+
+/// How new chunks are compressed; old ones stay as they are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Compression {
+    /// Small, and fast to read.
+    #[default]
+    Zstd,
+    /// Larger, and faster still.
+    Lz4,
+    /// As the messages are.
+    None,
+}
+
+impl Compression {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Zstd => "zstd",
+            Self::Lz4 => "lz4",
+            Self::None => "",
+        }
+    }
+
+    pub(super) fn compress(self, bytes: &[u8]) -> io::Result<Vec<u8>> {
+        match self {
+            Self::Zstd => zstd::bulk::compress(bytes, zstd::DEFAULT_COMPRESSION_LEVEL),
+            Self::Lz4 => {
+                let mut encoder = lz4::EncoderBuilder::new().build(Vec::new())?;
+                encoder.write_all(bytes)?;
+                let (compressed, finished) = encoder.finish();
+                finished.map(|()| compressed)
+            }
+            Self::None => Ok(bytes.to_vec()),
+        }
+    }
+}
