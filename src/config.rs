@@ -368,7 +368,12 @@ impl Config {
         positive("fusion.bridge_max_s", Some(fusion.bridge_max_s))?;
         let orders = 1..=crate::estimate::polynomial::MAX_ORDER;
         range(orders.contains(&fusion.order), "fusion.order".into(), fusion.order.to_string(), "1 to 48")?;
-        range(orders.contains(&beyond.order), "extrapolation.order".into(), beyond.order.to_string(), "1 to 48")?;
+        range(
+            orders.contains(&beyond.order),
+            "extrapolation.order".into(),
+            beyond.order.to_string(),
+            "1 to 48",
+        )?;
         range(
             (1..=100_000).contains(&fusion.window_points),
             "fusion.window_points".into(),
@@ -461,8 +466,14 @@ mod tests {
             ("[fusion]\norder = 49", "fusion.order is 49, expected 1 to 48"),
             ("[extrapolation]\nhorizon_s = -1.0", "extrapolation.horizon_s is -1"),
             ("[[source]]\nname = \"a\"", "source \"a\": position is missing"),
-            ("[[source]]\nname = \"a\"\nposition = \"/a.p\"\n[[source]]\nname = \"a\"\nposition = \"/b.p\"", "a name of its own"),
-            ("[[source]]\nname = \"a\"\nposition = \"/a.p\"\nposition_sigma_m = -1.0", "position_sigma_m is -1.0"),
+            (
+                "[[source]]\nname = \"a\"\nposition = \"/a.p\"\n[[source]]\nname = \"a\"\nposition = \"/b.p\"",
+                "a name of its own",
+            ),
+            (
+                "[[source]]\nname = \"a\"\nposition = \"/a.p\"\nposition_sigma_m = -1.0",
+                "position_sigma_m is -1.0",
+            ),
             ("[[characteristic_point]]\nname = \"exit\"\nz_m = inf", "z_m is inf"),
             ("[fusion]\nestimate = [\"bias\"]", "fusion.estimate is [bias], expected \"auto\" or []"),
         ] {

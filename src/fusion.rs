@@ -13,9 +13,9 @@ use crate::estimate::characteristic_point::{self, CharacteristicPoint, Height};
 use crate::estimate::coverage::{self, Coverage};
 use crate::estimate::extrapolation::{self, Extrapolation, Holdout};
 use crate::estimate::moving_average::MovingAverage;
+use crate::estimate::polynomial;
 use crate::estimate::spline::{self, Coefficients};
 use crate::estimate::weighted_mean::WeightedMean;
-use crate::estimate::polynomial;
 use crate::sample::{Quantity, Source};
 use crate::time::Time;
 use crate::track::{Curve, Method, Phase, State, Track, TrackPoint};
@@ -157,7 +157,13 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
             ..settings
         };
         let carry = |settings, stop_z_m: Option<f64>| -> Result<(Vec<TrackPoint>, Extrapolation), _> {
-            let made = extrapolation::extrapolate(&piece.sources, &*piece.curve, piece.from_s, piece.to_s, &settings)?;
+            let made = extrapolation::extrapolate(
+                &piece.sources,
+                &*piece.curve,
+                piece.from_s,
+                piece.to_s,
+                &settings,
+            )?;
             let carried = seconds
                 .iter()
                 .map_while(|&t| point(&made, t, Phase::Extrapolated, Method::Polynomial, 0))
@@ -343,9 +349,10 @@ fn warn_of_disagreement(
     }
     for second in 0..sources.len() {
         for first in 0..second {
-            let meet = coverage.runs(first).iter().any(|a| {
-                coverage.runs(second).iter().any(|b| a.0 <= b.1 && b.0 <= a.1)
-            });
+            let meet = coverage
+                .runs(first)
+                .iter()
+                .any(|a| coverage.runs(second).iter().any(|b| a.0 <= b.1 && b.0 <= a.1));
             if !meet {
                 warnings.push(format!(
                     "{} and {} never see the vehicle at the same time: nobody can say whether they agree, and \
@@ -384,7 +391,8 @@ fn phases(track: &Track, pieces: &[Piece], coverage: &Coverage, plan: &Plan) -> 
             for sample in series {
                 let seen_by = coverage.seen_by(sample.time_s);
                 let phase = Coverage::phase(seen_by);
-                let Some(index) = summaries.iter().position(|s| s.phase == phase && s.seen_by == seen_by) else {
+                let Some(index) = summaries.iter().position(|s| s.phase == phase && s.seen_by == seen_by)
+                else {
                     continue;
                 };
                 if let Some(state) = piece.curve.at(sample.time_s) {

@@ -1,12 +1,15 @@
 //! `trackfuse`
 #![forbid(unsafe_code)]
 
+pub mod cli;
+pub mod commands;
 pub mod config;
 pub mod estimate;
 pub mod fusion;
 pub mod log;
 pub mod math;
 pub mod publish;
+pub mod report;
 pub mod sample;
 pub mod simulate;
 pub mod source;

@@ -1,2 +1,24 @@
-//! The `trackfuse` program.
-fn main() {}
+//! The `trackfuse` program: parse, dispatch, one error print, exit code.
+
+use std::process::ExitCode;
+
+use clap::Parser;
+use trackfuse::cli::{Cli, Command};
+use trackfuse::commands;
+
+fn main() -> ExitCode {
+    let done = match &Cli::parse().command {
+        Command::Fuse(args) => commands::fuse(args),
+        Command::Simulate(args) => commands::simulate(args),
+    };
+    match done {
+        Ok(outcome) => outcome.into(),
+        Err(error) => {
+            eprintln!("error: {error}");
+            if let Some(hint) = error.hint() {
+                eprintln!("hint: {hint}");
+            }
+            ExitCode::from(error.exit_code())
+        }
+    }
+}

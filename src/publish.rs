@@ -164,9 +164,8 @@ fn json(message: &impl Serialize) -> Vec<u8> {
 /// The message of a point; `None` where its position or velocity is not finite.
 fn point_message(point: &TrackPoint, frame_id: &str, labels: &Labels<'_>) -> Option<Vec<u8>> {
     let s = &point.state;
-    let edge = |sign: f64| {
-        xyz(std::array::from_fn(|i| s.position[i] + sign * BAND_SIGMAS * s.position_sigma[i]))
-    };
+    let edge =
+        |sign: f64| xyz(std::array::from_fn(|i| s.position[i] + sign * BAND_SIGMAS * s.position_sigma[i]));
     let sources = labels.sources.iter().enumerate().filter(|(i, _)| point.seen_by >> i & 1 == 1);
     Some(json(&PointMessage {
         timestamp: point.time.into(),
@@ -216,9 +215,11 @@ pub fn event_message(event: &CharacteristicPoint, frame_id: &str, labels: &Label
 }
 
 /// The summary and each warning as log messages at `time`.
+#[must_use]
 pub fn log_messages(summary: &str, warnings: &[String], time: Time) -> Vec<Published> {
     let message = |level, message: &str| {
-        let line = LogMessage { timestamp: time.into(), level, message, name: "trackfuse", file: "", line: 0 };
+        let line =
+            LogMessage { timestamp: time.into(), level, message, name: "trackfuse", file: "", line: 0 };
         Published { topic: Topic::Log, time, data: json(&line) }
     };
     let mut messages = vec![message(INFO, summary)];

@@ -13,10 +13,15 @@ fn scenarios() -> Vec<PathBuf> {
     let mut paths: Vec<PathBuf> = fs::read_dir(folder)
         .unwrap()
         .map(|entry| entry.unwrap().path())
-        .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
+        .filter(|path| path.to_string_lossy().ends_with(".scenario.toml"))
         .collect();
     paths.sort();
     paths
+}
+
+/// `steep_climb.scenario.toml` -> `steep_climb.mcap`
+fn stored(scenario: &Path) -> PathBuf {
+    scenario.with_extension("").with_extension("mcap")
 }
 
 fn log_of(scenario: &Path) -> Vec<u8> {
@@ -32,7 +37,7 @@ fn every_sample_log_is_what_its_scenario_makes() {
     let scenarios = scenarios();
     assert_eq!(scenarios.len(), 3, "{scenarios:?}");
     for scenario in scenarios {
-        let stored = scenario.with_extension("mcap");
+        let stored = stored(&scenario);
         let log = log_of(&scenario);
         if update {
             fs::write(&stored, log).unwrap();
@@ -46,14 +51,14 @@ fn every_sample_log_is_what_its_scenario_makes() {
 #[test]
 fn sample_logs_are_small_indexed_and_have_the_channels_they_promise() {
     for path in scenarios() {
-        let bytes = fs::read(path.with_extension("mcap")).unwrap();
+        let bytes = fs::read(stored(&path)).unwrap();
         assert!(bytes.len() < 2_000_000, "{}: {} bytes", path.display(), bytes.len());
         let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
         assert!(summary.chunk_indexes.len() > 2, "{}", path.display());
         assert_eq!(summary.attachment_indexes.len(), 2);
         assert_eq!(summary.metadata_indexes.len(), 2);
         let topics: Vec<&str> = summary.channels.values().map(|channel| channel.topic.as_str()).collect();
-        let single = path.ends_with("single_source.toml");
+        let single = path.ends_with("single_source.scenario.toml");
         assert_eq!(topics.contains(&"/tether/track"), !single, "{topics:?}");
         for topic in ["/beacon/track", "/reference/ins", "/sonar/image", "/ship/log"] {
             assert!(topics.contains(&topic), "{topic} is missing in {topics:?}");

@@ -1,13 +1,12 @@
 //! `trackfuse simulate`: scenario -> truth and sensors -> log.
 
-use std::io::BufWriter;
 use std::path::Path;
 
 use serde_json::json;
 
 use super::{CommandError, Outcome, say};
 use crate::cli::Simulate;
-use crate::log::{LogError, publish_file};
+use crate::log::write_new;
 use crate::simulate::{Scenario, simulate as run, write_simulation};
 
 /// Makes the log of a scenario file.
@@ -22,8 +21,8 @@ pub fn simulate(args: &Simulate) -> Result<Outcome, CommandError> {
     };
     let scenario = Scenario::from_toml(&read(&args.scenario)?)?;
     let simulation = run(&scenario)?;
-    let len = publish_file(&args.output, args.force, |file| {
-        write_simulation(&scenario, &simulation, BufWriter::new(file)).map_err(CommandError::from)
+    let len = write_new(&args.output, args.force, |file| {
+        write_simulation(&scenario, &simulation, file).map_err(CommandError::from)
     })?;
 
     let end = simulation.phases.t3_s;
@@ -35,7 +34,11 @@ pub fn simulate(args: &Simulate) -> Result<Outcome, CommandError> {
         args.scenario.display(),
         counts.join(", ")
     );
-    let points: Vec<_> = simulation.characteristic_points.iter().map(|p| json!({"time_s": p.t_s, "z_m": p.z_m, "vertical_speed_m_s": p.vz_m_s})).collect();
+    let points: Vec<_> = simulation
+        .characteristic_points
+        .iter()
+        .map(|p| json!({"time_s": p.t_s, "z_m": p.z_m, "vertical_speed_m_s": p.vz_m_s}))
+        .collect();
     let summary = json!({
         "scenario": scenario.name,
         "output": output,
@@ -46,14 +49,5 @@ pub fn simulate(args: &Simulate) -> Result<Outcome, CommandError> {
         "characteristic_points": points,
     });
     say(args.voice, &text, &summary, &[]);
-    Ok::<_, CommandError>(Outcome::Done).map_err(|e: CommandError| e).map_err(CommandError::from_log)
+    Ok(Outcome::Done)
 }
-
-impl CommandError {
-    fn from_log(self) -> Self {
-        self
-    }
-}
-
-#[allow(dead_code)]
-type Unused = LogError;

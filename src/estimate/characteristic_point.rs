@@ -84,7 +84,8 @@ mod tests {
 
     #[test]
     fn the_first_upward_crossing_counts_with_its_uncertainty() {
-        let found = first_crossing(&track(&[-1.0, -3.0, -2.0, 0.0, 2.0, -5.0, 5.0]), &at(-0.5)).expect("crossed");
+        let found =
+            first_crossing(&track(&[-1.0, -3.0, -2.0, 0.0, 2.0, -5.0, 5.0]), &at(-0.5)).expect("crossed");
         assert_eq!(found.time, Time::from_ns(2_750_000_000));
         assert_eq!(found.time_sigma_s, Some(0.2)); // 0.4 m at 2 m/s
         assert!((found.state.velocity_sigma[2] - 0.3_f64.hypot(0.6)).abs() < 1e-12);

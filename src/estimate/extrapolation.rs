@@ -99,7 +99,11 @@ pub fn extrapolate(
         }
     }
     if misses.is_empty() {
-        return Err(EstimateError::TooFewSamples { what: "extrapolation's trials".into(), needed: 1, got: 0 });
+        return Err(EstimateError::TooFewSamples {
+            what: "extrapolation's trials".into(),
+            needed: 1,
+            got: 0,
+        });
     }
     let acceleration_density = std::array::from_fn(|axis| density(&misses, axis));
     Ok(Extrapolation { polynomial, from_s: to_s, acceleration_density, holdout: holdout(&misses) })
@@ -127,9 +131,7 @@ fn density(misses: &[Miss], axis: usize) -> f64 {
 
 fn holdout(misses: &[Miss]) -> Holdout {
     let farthest: Vec<&Miss> = misses.chunk_by(|a, b| a.origin == b.origin).filter_map(<[_]>::last).collect();
-    let mean = |f: &dyn Fn(&Miss) -> f64| {
-        farthest.iter().map(|m| f(m)).sum::<f64>() / farthest.len() as f64
-    };
+    let mean = |f: &dyn Fn(&Miss) -> f64| farthest.iter().map(|m| f(m)).sum::<f64>() / farthest.len() as f64;
     let square = |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>();
     Holdout {
         position_m: mean(&|m| square(m.made.position, m.truth.position)).sqrt(),
@@ -165,11 +167,7 @@ mod tests {
                 .map(|t| Sample { time_s: t, value: [f(t); 3], sigma: [0.01; 3] })
                 .collect()
         };
-        Source {
-            name: "test".into(),
-            positions: series(&|t| z(t).0),
-            velocities: series(&|t| z(t).1),
-        }
+        Source { name: "test".into(), positions: series(&|t| z(t).0), velocities: series(&|t| z(t).1) }
     }
 
     const SETTINGS: Settings =

@@ -88,7 +88,8 @@ mod tests {
     struct Parabola;
     impl Curve for Parabola {
         fn at(&self, t: f64) -> Option<State> {
-            let state = State { position: [0.0, 0.0, t * t], velocity: [0.0, 0.0, 2.0 * t], ..State::default() };
+            let state =
+                State { position: [0.0, 0.0, t * t], velocity: [0.0, 0.0, 2.0 * t], ..State::default() };
             (t >= 0.0).then_some(state)
         }
     }

@@ -79,10 +79,12 @@ pub fn fit(
 ) -> Result<Polynomial, EstimateError> {
     assert!((1..=MAX_ORDER).contains(&order));
     let sources: Vec<Source> = sources.iter().map(|s| s.within(from_s, to_s)).collect();
-    let polynomial = Scale { order, middle_s: from_s.midpoint(to_s), half_s: (0.5 * (to_s - from_s)).max(1e-9) };
+    let polynomial =
+        Scale { order, middle_s: from_s.midpoint(to_s), half_s: (0.5 * (to_s - from_s)).max(1e-9) };
     let first = sources.iter().flat_map(|s| &s.positions).next();
     let centre = first.map(|p| p.value).ok_or_else(|| undetermined(order, "there is no position"))?;
-    let solve = |quantities: &[Quantity], axis| polynomial.solve(&sources, quantities, axis, centre[axis], prior);
+    let solve =
+        |quantities: &[Quantity], axis| polynomial.solve(&sources, quantities, axis, centre[axis], prior);
     let (position, velocity) = match coefficients {
         Coefficients::Shared => {
             let shared = all_axes(|axis| solve(&Quantity::ALL, axis))?;
@@ -225,9 +227,13 @@ mod tests {
             let fitted = fit(&[cubic()], 100.0, 102.0, 5, coefficients, None).expect("a good problem");
             for t in [0.0_f64, 1.0, 1.9, 4.0] {
                 let state = fitted.at(100.0 + t).expect("everywhere");
-                assert!((state.position[2] - 2.0 * (3.0 - 2.0 * t + 0.5 * t * t - 0.1 * t.powi(3))).abs() < 1e-8);
+                assert!(
+                    (state.position[2] - 2.0 * (3.0 - 2.0 * t + 0.5 * t * t - 0.1 * t.powi(3))).abs() < 1e-8
+                );
                 assert!((state.velocity[0] - (-2.0 + t - 0.3 * t * t)).abs() < 1e-8);
-                assert!((state.acceleration.expect("a polynomial has one")[1] - (-1.0 + 0.6 * t)).abs() < 1e-7);
+                assert!(
+                    (state.acceleration.expect("a polynomial has one")[1] - (-1.0 + 0.6 * t)).abs() < 1e-7
+                );
             }
         }
     }
@@ -242,7 +248,8 @@ mod tests {
 
     #[test]
     fn order_48_stays_finite_and_close() {
-        let fitted = fit(&[cubic()], 100.0, 102.0, 48, Coefficients::Shared, None).expect("80 rows, 49 unknowns");
+        let fitted =
+            fit(&[cubic()], 100.0, 102.0, 48, Coefficients::Shared, None).expect("80 rows, 49 unknowns");
         let state = fitted.at(101.0).expect("everywhere");
         assert!((state.position[0] - 1.4).abs() < 1e-6, "{}", state.position[0]);
     }

@@ -46,6 +46,17 @@ pub enum Coefficients {
     Independent,
 }
 
+impl Coefficients {
+    /// The reading's name in configs and reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Shared => "shared",
+            Self::Independent => "independent",
+        }
+    }
+}
+
 /// How the weight of the jerk penalty is chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Smoothing {

@@ -68,10 +68,7 @@ impl<'a> Appender<'a> {
         compression: Compression,
     ) -> Result<Self, LogError> {
         let out = out.as_ref();
-        log.ensure_appendable()?;
-        check_output(log, out, force)?;
-        let ids = assign_ids(log, channels)?;
-
+        let ids = checked(log, out, force, channels)?;
         let mut appender = Self {
             log,
             out: out.to_owned(),
@@ -89,6 +86,19 @@ impl<'a> Appender<'a> {
             appender.define(channel, ids)?;
         }
         Ok(appender)
+    }
+
+    /// Makes all checks of [`Appender::begin`], so that nothing need be computed for an output that can't be.
+    ///
+    /// # Errors
+    /// As [`Appender::begin`], but for [`LogError::Write`] of a full or read-only disk.
+    pub fn check(
+        log: &Log,
+        out: impl AsRef<Path>,
+        force: bool,
+        channels: &[NewChannel],
+    ) -> Result<(), LogError> {
+        checked(log, out.as_ref(), force, channels).map(|_| ())
     }
 
     /// Adds a message. Chunks are cut as messages come, so those near in time should come together.
@@ -230,6 +240,12 @@ impl<'a> Appender<'a> {
     fn cannot_write(&self, source: io::Error) -> LogError {
         LogError::Write { path: self.out.clone(), source }
     }
+}
+
+fn checked(log: &Log, out: &Path, force: bool, channels: &[NewChannel]) -> Result<Vec<Ids>, LogError> {
+    log.ensure_appendable()?;
+    check_output(log, out, force)?;
+    assign_ids(log, channels)
 }
 
 /// The log's statistics, with counts that aren't below what is there: some writers count only what

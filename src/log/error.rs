@@ -154,7 +154,10 @@ impl LogError {
             Self::CutOff { .. } | Self::Damaged { .. } => {
                 "`mcap recover IN -o OUT` saves what is readable (it drops private records and bad chunks)"
             }
-            Self::NotAppendable { .. } => "`--sidecar OUT` writes the new channels into a file of their own",
+            Self::NotAppendable { .. } => {
+                "keep the original and add to an indexed copy: `mcap recover LOG -o COPY` makes one, but drops \
+                 private records"
+            }
             Self::TopicTaken { .. } => {
                 "choose another name with `--prefix`, or take the old channels out with `trackfuse restore` first"
             }

@@ -170,6 +170,15 @@ impl Log {
         }
     }
 
+    /// The bytes behind DataEnd: summary, footer and magic. They tell two logs apart that share a data section.
+    ///
+    /// # Errors
+    /// [`LogError::Read`]; [`LogError::TooLarge`].
+    pub fn tail(&self) -> Result<Vec<u8>, LogError> {
+        let start = (self.index.data_end + DATA_END_LEN).min(self.index.file_len);
+        self.file.bytes(start, self.index.file_len - start, "the summary")
+    }
+
     /// The parts of the log that hold messages, in file order.
     pub(super) fn blocks(&self) -> Vec<chunk::Block<'_>> {
         chunk::blocks(&self.index)
@@ -403,7 +412,7 @@ mod tests {
             matches!(refused, LogError::NotAppendable { obstacle: Obstacle::LooseMessages { .. }, .. }),
             "{refused}"
         );
-        assert!(refused.hint().unwrap().contains("--sidecar"));
+        assert!(refused.hint().unwrap().contains("indexed copy"));
     }
 
     #[test]

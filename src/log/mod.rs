@@ -34,3 +34,4 @@ pub use error::{LogError, Obstacle};
 pub use index::{Index, Log, Schema};
 pub use mcap::records::{AttachmentIndex, Channel, ChunkIndex, MetadataIndex, Statistics};
 pub use messages::{Message, OwnedMessage};
+pub use output::write_new;

@@ -55,14 +55,44 @@ impl Sink {
     }
 
     pub(super) fn publish(self, out: &Path, force: bool) -> io::Result<()> {
-        let file = self.file.into_inner().map_err(io::IntoInnerError::into_error)?;
-        file.as_file().sync_all()?;
-        let named = if force { file.persist(out) } else { file.persist_noclobber(out) };
-        named.map_err(|e| e.error)?;
-        #[cfg(unix)]
-        File::open(directory(out))?.sync_all()?;
-        Ok(())
+        publish(self.file, out, force)
     }
+}
+
+/// Writes a new file, of any content: nothing bears its name until all of it is on the disk. Returns its
+/// length in bytes.
+///
+/// # Errors
+/// [`LogError::OutputExists`] without `force`, before anything is written; [`LogError::Write`]; whatever
+/// `write` returns.
+pub fn write_new<E: From<LogError>>(
+    out: &Path,
+    force: bool,
+    write: impl FnOnce(&mut BufWriter<NamedTempFile>) -> Result<(), E>,
+) -> Result<u64, E> {
+    let written = |source| LogError::Write { path: out.to_owned(), source };
+    check_name(out, force)?;
+    let mut file = BufWriter::new(temporary_beside(out).map_err(written)?);
+    write(&mut file)?;
+    let len = file.stream_position().map_err(written)?;
+    match publish(file, out, force) {
+        Ok(()) => Ok(len),
+        Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {
+            Err(LogError::OutputExists { path: out.to_owned() }.into())
+        }
+        Err(source) => Err(written(source).into()),
+    }
+}
+
+/// Flushes, syncs and names a file, and syncs its directory.
+fn publish(file: BufWriter<NamedTempFile>, out: &Path, force: bool) -> io::Result<()> {
+    let file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
+    file.as_file().sync_all()?;
+    let named = if force { file.persist(out) } else { file.persist_noclobber(out) };
+    named.map_err(|e| e.error)?;
+    #[cfg(unix)]
+    File::open(directory(out))?.sync_all()?;
+    Ok(())
 }
 
 fn directory(out: &Path) -> &Path {
@@ -84,6 +114,11 @@ pub(super) fn check_output(log: &Log, out: &Path, force: bool) -> Result<(), Log
     if is_same_file(&log.file.file, &log.file.path, out) {
         return Err(LogError::OutputIsInput { path: path() });
     }
+    check_name(out, force)
+}
+
+fn check_name(out: &Path, force: bool) -> Result<(), LogError> {
+    let path = || out.to_owned();
     match fs::symlink_metadata(out) {
         Ok(_) if !force => Err(LogError::OutputExists { path: path() }),
         Ok(found) if found.is_dir() => {

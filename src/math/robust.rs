@@ -24,7 +24,9 @@ pub fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
 
 /// Standard deviation about zero by the median absolute value, or `None` of nothing. Reorders `values`.
 pub fn sigma_about_zero(values: &mut [f64]) -> Option<f64> {
-    values.iter_mut().for_each(|v| *v = v.abs());
+    for v in values.iter_mut() {
+        *v = v.abs();
+    }
     median(values).map(|m| m * MAD_TO_SIGMA)
 }
 

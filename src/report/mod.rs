@@ -7,11 +7,11 @@ pub use text::render;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::estimate::coverage;
 use crate::fusion::{Fusion, Plan};
 use crate::sample::Quantity;
 use crate::source::{Candidate, Loaded};
 use crate::time::Time;
-use crate::estimate::coverage;
 
 /// The report of `fuse`. Nanoseconds are strings, since JSON numbers lose them.
 #[derive(Clone, Debug, Serialize, JsonSchema)]

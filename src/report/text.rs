@@ -4,7 +4,7 @@ use std::fmt::{self, Write};
 
 use super::Report;
 
-/// The report as text, lines of about 100 characters.
+/// The report as text. It doesn't name the files, which may change without the track changing.
 #[must_use]
 pub fn render(report: &Report) -> String {
     let mut page = String::new();
@@ -15,12 +15,17 @@ pub fn render(report: &Report) -> String {
 
 fn write_page(out: &mut String, report: &Report) -> fmt::Result {
     let track = &report.track;
-    writeln!(out, "{} -> {}", report.input, report.output)?;
-    writeln!(out)?;
     sources(out, report)?;
     writeln!(out)?;
     let duration = track.span_s.1 - track.span_s.0;
-    write!(out, "track   {} ({}), {} points at {} Hz over {duration:.2} s", track.method.to_uppercase(), track.coefficients, track.points, short(track.rate_hz))?;
+    write!(
+        out,
+        "track   {} ({}), {} points at {} Hz over {duration:.2} s",
+        track.method.to_uppercase(),
+        track.coefficients,
+        track.points,
+        short(track.rate_hz)
+    )?;
     if track.pieces > 1 {
         write!(out, ", in {} pieces", track.pieces)?;
     }
@@ -92,11 +97,16 @@ fn sources(out: &mut String, report: &Report) -> fmt::Result {
             source.clock,
             sigma.join(", ")
         )?;
-        let paths: Vec<&str> = [&source.position, &source.velocity].into_iter().flatten().map(String::as_str).collect();
+        let paths: Vec<&str> =
+            [&source.position, &source.velocity].into_iter().flatten().map(String::as_str).collect();
         writeln!(out, "  {}", paths.join(", "))?;
     }
     if let Some(datum) = report.sources.iter().find(|s| s.datum) {
-        writeln!(out, "errors of the datum itself ({}) can't be seen by anyone: they pass into the track 1:1", datum.name)?;
+        writeln!(
+            out,
+            "errors of the datum itself ({}) can't be seen by anyone: they pass into the track 1:1",
+            datum.name
+        )?;
     }
     if !report.unused_topics.is_empty() {
         writeln!(out, "not used: {}", report.unused_topics.join(", "))?;
@@ -132,13 +142,21 @@ fn phases(out: &mut String, report: &Report) -> fmt::Result {
 }
 
 fn events(out: &mut String, report: &Report) -> fmt::Result {
-    writeln!(out, "{:<34} {:>20} {:>12} {:>24}   phase", "characteristic point", "time s", "z m", "vertical speed m/s")?;
+    writeln!(
+        out,
+        "{:<34} {:>20} {:>12} {:>24}   phase",
+        "characteristic point", "time s", "z m", "vertical speed m/s"
+    )?;
     for event in &report.characteristic_points {
         let time = event
             .time_sigma_s
             .map_or(format!("{:.3}", event.time_s), |s| format!("{:.3} ± {s:.3}", event.time_s));
         let speed = format!("{:.2} ± {:.2}", event.velocity_m_s[2], event.velocity_sigma_m_s[2]);
-        writeln!(out, "{:<34} {time:>20} {:>12.2} {speed:>24}   {}", event.name, event.position_m[2], event.phase)?;
+        writeln!(
+            out,
+            "{:<34} {time:>20} {:>12.2} {speed:>24}   {}",
+            event.name, event.position_m[2], event.phase
+        )?;
     }
     Ok(())
 }

@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 
 use super::Simulation;
-use super::log::{Channel, Message, object_schema, round, stamp_json, time_schema};
+use super::log::{Channel, Message, Schema, object_schema, round, stamp_json, time_schema};
 use super::scenario::Scenario;
 use crate::time::Time;
 
@@ -35,7 +35,7 @@ pub(super) fn channels(scenario: &Scenario, simulation: &Simulation) -> [Channel
         .map(|((_, time), ping)| Message {
             log_time: time,
             publish_time: time,
-            data: sonar_ping(ping, recording.sonar_bytes, &mut rng),
+            data: compressed_image(time, &sonar_ping(ping, recording.sonar_bytes, &mut rng)),
         })
         .collect();
     let battery = times(2.0, 0.0137).map(|(t_s, time)| battery(t_s, time)).collect();
@@ -52,20 +52,50 @@ pub(super) fn channels(scenario: &Scenario, simulation: &Simulation) -> [Channel
     .map(|(t_s, text)| entry(release.plus_seconds(t_s + 0.0007), text));
 
     [
-        channel("/sonar/image", "x-sonar", None, sonar),
-        channel("/ship/log", "json", Some(("foxglove.Log", log_schema())), heartbeat.chain(events).collect()),
-        channel("/vehicle/battery", "json", Some(("vehicle.Battery", battery_schema())), battery),
-        channel("/ship/gnss", "json", Some(("foxglove.LocationFix", position_schema())), gnss),
+        channel("/sonar/image", "cdr", Schema::ros2("sensor_msgs/msg/CompressedImage", IMAGE), sonar),
+        channel(
+            "/ship/log",
+            "json",
+            Schema::json("foxglove.Log", &log_schema()),
+            heartbeat.chain(events).collect(),
+        ),
+        channel("/vehicle/battery", "json", Schema::json("vehicle.Battery", &battery_schema()), battery),
+        channel("/ship/gnss", "json", Schema::json("foxglove.LocationFix", &position_schema()), gnss),
     ]
 }
 
-fn channel(
-    topic: &'static str,
-    encoding: &'static str,
-    schema: Option<(&'static str, Value)>,
-    messages: Vec<Message>,
-) -> Channel {
+fn channel(topic: &'static str, encoding: &'static str, schema: Schema, messages: Vec<Message>) -> Channel {
     Channel { topic, encoding, schema, metadata: BTreeMap::new(), messages }
+}
+
+/// The definition of the sonar's messages.
+const IMAGE: &str = "\
+std_msgs/Header header
+string format
+uint8[] data
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+";
+
+/// A `sensor_msgs/CompressedImage` in little-endian CDR, in a format of the sonar's own.
+fn compressed_image(time: Time, ping: &[u8]) -> Vec<u8> {
+    let (sec, nsec) = time.to_stamp();
+    let mut message = vec![0, 1, 0, 0];
+    message.extend((sec as i32).to_le_bytes());
+    message.extend(nsec.to_le_bytes());
+    for bytes in [b"sonar\0".as_slice(), b"x-sonar\0", ping] {
+        let aligned = (message.len() - 4).next_multiple_of(4) + 4; // counted behind the four bytes of the head
+        message.resize(aligned, 0);
+        message.extend((bytes.len() as u32).to_le_bytes());
+        message.extend(bytes);
+    }
+    message
 }
 
 /// A made-up binary ping: a mark, its number, then echoes that fade, with one from the sea floor, under

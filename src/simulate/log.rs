@@ -23,10 +23,26 @@ const FRAME: &str = "enu";
 pub(super) struct Channel {
     pub(super) topic: &'static str,
     pub(super) encoding: &'static str,
-    /// Name and JSON Schema; none for messages that only their maker can read.
-    pub(super) schema: Option<(&'static str, Value)>,
+    pub(super) schema: Schema,
     pub(super) metadata: BTreeMap<String, String>,
     pub(super) messages: Vec<Message>,
+}
+
+/// What a channel's messages are made of.
+pub(super) struct Schema {
+    name: &'static str,
+    encoding: &'static str,
+    text: String,
+}
+
+impl Schema {
+    pub(super) fn json(name: &'static str, schema: &Value) -> Self {
+        Self { name, encoding: "jsonschema", text: schema.to_string() }
+    }
+
+    pub(super) fn ros2(name: &'static str, definition: &str) -> Self {
+        Self { name, encoding: "ros2msg", text: definition.to_owned() }
+    }
 }
 
 /// One message.
@@ -105,10 +121,8 @@ fn write_messages<W: Write + Seek>(
 ) -> Result<(), SimulateError> {
     let mut ordered = Vec::new();
     for channel in channels {
-        let schema_id = match &channel.schema {
-            Some((name, text)) => log.add_schema(name, "jsonschema", text.to_string().as_bytes())?,
-            None => 0,
-        };
+        let Schema { name, encoding, text } = &channel.schema;
+        let schema_id = log.add_schema(name, encoding, text.as_bytes())?;
         let id = log.add_channel(schema_id, channel.topic, channel.encoding, &channel.metadata)?;
         ordered.extend(channel.messages.iter().map(|message| (id, message)));
     }
@@ -137,7 +151,7 @@ fn track_channel(sensor: &SensorRecord, release: Time) -> Channel {
     Channel {
         topic,
         encoding: "json",
-        schema: Some(("trackfuse.TrackSample", track_schema())),
+        schema: Schema::json("trackfuse.TrackSample", &track_schema()),
         metadata: BTreeMap::from([("sensor".to_owned(), title.to_owned())]),
         messages: sensor.samples.iter().map(|sample| track_message(sample, release)).collect(),
     }

@@ -102,7 +102,13 @@ pub fn load(log: &Log, configs: &[SourceConfig]) -> Result<(Vec<Loaded>, Time), 
                 return Err(SourceError::NoTopic {
                     name: source.config.name.clone(),
                     topic: topic.to_owned(),
-                    topics: index.channels.values().map(|c| c.topic.clone()).collect::<BTreeSet<_>>().into_iter().collect(),
+                    topics: index
+                        .channels
+                        .values()
+                        .map(|c| c.topic.clone())
+                        .collect::<BTreeSet<_>>()
+                        .into_iter()
+                        .collect(),
                 });
             }
             for channel in channels {
@@ -136,7 +142,10 @@ impl<'a> Gathered<'a> {
         let parse = |(quantity, text): (Quantity, &Option<String>)| {
             let text = text.as_ref()?;
             let path = MessagePath::parse(text);
-            Some(path.map(|p| (quantity, p)).map_err(|error| SourceError::Path { name: config.name.clone(), error }))
+            Some(
+                path.map(|p| (quantity, p))
+                    .map_err(|error| SourceError::Path { name: config.name.clone(), error }),
+            )
         };
         Ok(Self {
             config,
@@ -232,7 +241,8 @@ impl<'a> Gathered<'a> {
             (*source.series_mut(quantity), sigma[quantity as usize]) = samples(readings, origin, configured);
         }
         let names = ["stamp", "publish", "log"];
-        let used: Vec<&str> = names.iter().zip(self.clocks).filter(|(_, n)| *n > 0).map(|(name, _)| *name).collect();
+        let used: Vec<&str> =
+            names.iter().zip(self.clocks).filter(|(_, n)| *n > 0).map(|(name, _)| *name).collect();
         let quantile = |delays: &mut Vec<f64>, share| robust::quantile(delays, share).unwrap_or(0.0);
         let timing = Timing {
             clock: used.join("+"),
@@ -259,7 +269,8 @@ impl<'a> Gathered<'a> {
             warnings.push(format!("{name}: {count} samples are left out: {what}"));
         }
         if self.untimed > 0 {
-            warnings.push(format!("{name}: {} messages are left out: they have no usable time", self.untimed));
+            warnings
+                .push(format!("{name}: {} messages are left out: they have no usable time", self.untimed));
         }
         if self.clocks.iter().filter(|n| **n > 0).count() > 1 {
             let [stamp, publish, log] = self.clocks;
@@ -269,7 +280,10 @@ impl<'a> Gathered<'a> {
             ));
         }
         if self.farthest_back_s > BACKWARD_S {
-            warnings.push(format!("{name}: times go back by up to {:.1} s from one message to the next", self.farthest_back_s));
+            warnings.push(format!(
+                "{name}: times go back by up to {:.1} s from one message to the next",
+                self.farthest_back_s
+            ));
         }
         warnings
     }

@@ -84,9 +84,10 @@ impl Reader {
         let schema = index.schema_of(channel);
         let (encoding, schema_name, data) =
             schema.map_or(("", "", &[][..]), |s| (s.encoding.as_str(), s.name.as_str(), s.data.as_slice()));
-        let whole = Decoder::new(&channel.message_encoding, encoding, schema_name, data).map_err(|error| {
-            SourceError::Decode { name: config.name.clone(), topic: channel.topic.clone(), error }
-        })?;
+        let whole =
+            Decoder::new(&channel.message_encoding, encoding, schema_name, data).map_err(|error| {
+                SourceError::Decode { name: config.name.clone(), topic: channel.topic.clone(), error }
+            })?;
         let known = |path: &MessagePath| whole.select(std::slice::from_ref(path)).is_ok();
         let root = |fields: &[&str]| MessagePath {
             topic: channel.topic.clone(),
@@ -278,7 +279,9 @@ mod tests {
             ])
         };
         let turned = rotation(&value(half)).expect("unit length")([1.0, 0.0, 0.5]);
-        assert!((turned[0]).abs() < 1e-12 && (turned[1] - 1.0).abs() < 1e-12 && (turned[2] - 0.5).abs() < 1e-12);
+        assert!(
+            (turned[0]).abs() < 1e-12 && (turned[1] - 1.0).abs() < 1e-12 && (turned[2] - 0.5).abs() < 1e-12
+        );
         assert!(rotation(&value(0.0)).is_none());
     }
 }

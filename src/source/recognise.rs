@@ -113,7 +113,8 @@ pub fn recognise(log: &Log, prefix: &str) -> Result<Recognised, SourceError> {
                     velocity: s.velocity.clone(),
                 })
                 .collect();
-            let what = "it is not clear which source is the datum, whose bias and clock are zero by definition";
+            let what =
+                "it is not clear which source is the datum, whose bias and clock are zero by definition";
             return Err(SourceError::Ambiguous { what: what.into(), candidates });
         }
     }
@@ -137,8 +138,8 @@ fn candidates(log: &Log, prefix: &str) -> Result<Vec<Candidate>, SourceError> {
         .filter(|c| !words(&c.topic).iter().any(|w| REFERENCE_WORDS.contains(&w.as_str())))
         .filter_map(|c| {
             let schema = index.schema_of(c);
-            let (encoding, name, data) =
-                schema.map_or(("", "", &[][..]), |s| (s.encoding.as_str(), s.name.as_str(), s.data.as_slice()));
+            let (encoding, name, data) = schema
+                .map_or(("", "", &[][..]), |s| (s.encoding.as_str(), s.name.as_str(), s.data.as_slice()));
             Some((c.id, Decoder::new(&c.message_encoding, encoding, name, data).ok()?))
         })
         .collect();
@@ -161,7 +162,8 @@ fn candidates(log: &Log, prefix: &str) -> Result<Vec<Candidate>, SourceError> {
 
 /// Whether a field that is just a `vector` is what `fields` look for: only the topic's name can say.
 fn vector_is(topic: &str, fields: &[&str]) -> bool {
-    let of_velocity = words(topic).iter().any(|w| ["vel", "velocity", "speed", "twist"].contains(&w.as_str()));
+    let of_velocity =
+        words(topic).iter().any(|w| ["vel", "velocity", "speed", "twist"].contains(&w.as_str()));
     let of_position = words(topic).iter().any(|w| ["pos", "position", "fix", "point"].contains(&w.as_str()));
     if fields == VELOCITY_FIELDS { of_velocity } else { of_position && !of_velocity }
 }
