@@ -1,5 +1,7 @@
 //! What a sensor says: vectors with their times and noise, in SI units, ready for an estimator.
 
+use std::cmp::Ordering;
+
 /// One measured vector: a position, m, or a velocity, m/s, in the track's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
@@ -105,6 +107,26 @@ impl Source {
     }
 }
 
+impl Source {
+    /// All samples in order of time, a position and a velocity of one instant together.
+    #[inline(always)]
+    pub fn instants(&self) -> impl Iterator<Item = (Option<&Sample>, Option<&Sample>)> {
+        let (mut positions, mut velocities) =
+            (self.positions.iter().peekable(), self.velocities.iter().peekable());
+        std::iter::from_fn(move || {
+            let order = match (positions.peek(), velocities.peek()) {
+                (None, None) => return None,
+                (Some(_), None) => Ordering::Less,
+                (None, Some(_)) => Ordering::Greater,
+                (Some(p), Some(v)) => p.time_s.total_cmp(&v.time_s),
+            };
+            let position = if order.is_le() { positions.next() } else { None };
+            let velocity = if order.is_ge() { velocities.next() } else { None };
+            Some((position, velocity))
+        })
+    }
+}
+
 /// The samples of an ordered series within `[from_s, to_s]`.
 #[must_use]
 pub fn slice(series: &[Sample], from_s: f64, to_s: f64) -> &[Sample] {
@@ -116,6 +138,30 @@ pub fn slice(series: &[Sample], from_s: f64, to_s: f64) -> &[Sample] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn instants_pair_what_was_measured_together() {
+        let at = |t: f64| Sample { time_s: t, value: [t; 3], sigma: [1.0; 3] };
+        let source = Source {
+            positions: [1.0, 2.0, 4.0].map(at).to_vec(),
+            velocities: [0.5, 2.0, 3.0, 4.0, 5.0].map(at).to_vec(),
+            ..Source::default()
+        };
+        let times: Vec<_> =
+            source.instants().map(|(p, v)| (p.map(|p| p.time_s), v.map(|v| v.time_s))).collect();
+        let both = |t| (Some(t), Some(t));
+        assert_eq!(
+            times,
+            [
+                (None, Some(0.5)),
+                (Some(1.0), None),
+                both(2.0),
+                (None, Some(3.0)),
+                both(4.0),
+                (None, Some(5.0))
+            ]
+        );
+    }
 
     #[test]
     fn a_slice_holds_both_of_its_ends_and_survives_a_reversed_interval() {

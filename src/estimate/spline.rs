@@ -31,8 +31,9 @@
 
 use super::EstimateError;
 use crate::math::banded::{Banded, Cholesky};
-use crate::math::gaussian_basis::{Active, GaussianBasis};
+use crate::math::gaussian_basis::{Active, GaussianBasis, MAX_ACTIVE};
 use crate::math::scalar;
+use crate::math::simd::{Kernel, vectorised};
 use crate::sample::{Quantity, Sample, Source};
 use crate::track::{Curve, State};
 
@@ -137,10 +138,16 @@ pub struct Spline {
     centre: [f64; 3],
     from_s: f64,
     to_s: f64,
-    blocks: Vec<Block>,
-    /// Which block holds the position and the velocity of each axis.
-    position_block: [usize; 3],
-    velocity_block: [usize; 3],
+    parts: Vec<Part>,
+}
+
+/// The axes whose weights agree, and what was fitted for them.
+#[derive(Clone, Debug)]
+struct Part {
+    axes: &'static [usize],
+    position: Block,
+    /// `None` where the velocity is the position's derivative.
+    velocity: Option<Block>,
 }
 
 /// What is fitted in one block.
@@ -182,37 +189,23 @@ pub fn fit(sources: &[Source], from_s: f64, to_s: f64, settings: &Settings) -> R
     let spacing = settings.knot_spacing_s.unwrap_or_else(|| default_knot_spacing_s(sources, from_s, to_s));
     let basis = GaussianBasis::covering(from_s, to_s, spacing, settings.margin, settings.width);
     let centre = middle(sources);
-    let separate: &[&[Quantity]] = match settings.coefficients {
-        Coefficients::Shared => &[&Quantity::ALL],
-        Coefficients::Independent => &[&[Quantity::Position], &[Quantity::Velocity]],
-    };
-    let groups: &[&[usize]] = if axes_agree(sources) { &[&[0, 1, 2]] } else { &[&[0], &[1], &[2]] };
-
-    let mut spline = Spline {
-        basis,
-        centre,
-        from_s,
-        to_s,
-        blocks: Vec::new(),
-        position_block: [0; 3],
-        velocity_block: [0; 3],
-    };
-    for quantities in separate {
-        for axes in groups {
+    let groups: &[&'static [usize]] = if axes_agree(sources) { &[&[0, 1, 2]] } else { &[&[0], &[1], &[2]] };
+    let parts = groups.iter().map(|&axes| {
+        let solve = |quantities| {
             let problem = Problem { sources, quantities, weights_of: axes[0], axes, centre };
-            let block = solve(&spline.basis, &problem, settings.smoothing)?;
-            for &axis in *axes {
-                if quantities.contains(&Quantity::Position) {
-                    spline.position_block[axis] = spline.blocks.len();
-                }
-                if quantities.contains(&Quantity::Velocity) {
-                    spline.velocity_block[axis] = spline.blocks.len();
-                }
-            }
-            spline.blocks.push(block);
-        }
-    }
-    Ok(spline)
+            solve(&basis, &problem, settings.smoothing)
+        };
+        Ok(match settings.coefficients {
+            Coefficients::Shared => Part { axes, position: solve(&Quantity::ALL)?, velocity: None },
+            Coefficients::Independent => Part {
+                axes,
+                position: solve(&[Quantity::Position])?,
+                velocity: Some(solve(&[Quantity::Velocity])?),
+            },
+        })
+    });
+    let parts = parts.collect::<Result<_, EstimateError>>()?;
+    Ok(Spline { basis, centre, from_s, to_s, parts })
 }
 
 fn check(sources: &[Source]) -> Result<(), EstimateError> {
@@ -259,40 +252,96 @@ fn axes_agree(sources: &[Source]) -> bool {
 impl Problem<'_> {
     /// Adds up the normal equations B'WB and B'Wz of eq. 11.
     fn normal(&self, basis: &GaussianBasis) -> Normal {
+        // 12 functions at an instant for a width of 1, up to 18 for wider ones
+        if basis.half_bandwidth() < 12 {
+            vectorised(Assembly::<12> { problem: self, basis })
+        } else {
+            vectorised(Assembly::<MAX_ACTIVE> { problem: self, basis })
+        }
+    }
+}
+
+/// The sum over all samples, N functions at an instant.
+struct Assembly<'a, const N: usize> {
+    problem: &'a Problem<'a>,
+    basis: &'a GaussianBasis,
+}
+
+impl<const N: usize> Kernel for Assembly<'_, N> {
+    type Output = Normal;
+
+    #[inline(always)]
+    fn run(self) -> Normal {
+        let Self { problem, basis } = self;
         let mut normal = Normal {
             gram: Banded::zeros(basis.count(), basis.half_bandwidth()),
             right: vec![[0.0; 3]; basis.count()],
             squares: [0.0; 3],
             rows: 0,
         };
-        for &quantity in self.quantities {
-            let centre = if quantity == Quantity::Position { self.centre } else { [0.0; 3] };
-            for sample in self.sources.iter().flat_map(|s| s.series(quantity)) {
-                let active = basis.at(sample.time_s);
-                let row = row(&active, quantity);
-                let weight = sample.sigma[self.weights_of].powi(-2);
-                normal.gram.add_outer(active.first, row, weight);
-                let value: [f64; 3] = std::array::from_fn(|a| sample.value[a] - centre[a]);
-                for (right, b) in normal.right[active.first..].iter_mut().zip(row) {
-                    for (r, v) in right.iter_mut().zip(value) {
-                        *r += weight * b * v;
-                    }
-                }
-                for (s, v) in normal.squares.iter_mut().zip(value) {
-                    *s += weight * v * v;
-                }
+        let [positions, velocities] = Quantity::ALL.map(|q| problem.quantities.contains(&q));
+        let (mut patch, mut active) = (Patch::<N>::new(), Active::default());
+        for (position, velocity) in problem.sources.iter().flat_map(Source::instants) {
+            let (position, velocity) = (position.filter(|_| positions), velocity.filter(|_| velocities));
+            let Some(any) = position.or(velocity) else { continue };
+            basis.evaluate(any.time_s, &mut active);
+            if active.first != patch.first {
+                patch.flush(&mut normal);
+                patch.first = active.first;
+            }
+            let [value, slope] = active.padded::<N>();
+            if let Some(p) = position {
+                let about_centre = std::array::from_fn(|a| p.value[a] - problem.centre[a]);
+                patch.add(value, about_centre, p.sigma[problem.weights_of].powi(-2), &mut normal.squares); // (7)
+                normal.rows += 1;
+            }
+            if let Some(v) = velocity {
+                patch.add(slope, v.value, v.sigma[problem.weights_of].powi(-2), &mut normal.squares); // (8)
                 normal.rows += 1;
             }
         }
+        patch.flush(&mut normal);
         normal
     }
 }
 
-/// The basis functions whose combination is the quantity: eq. 7 or eq. 8.
-fn row(active: &Active, quantity: Quantity) -> &[f64] {
-    match quantity {
-        Quantity::Position => active.value(), // (7)
-        Quantity::Velocity => active.slope(), // (8)
+/// The part of the normal equations that successive samples on the same N functions add to.
+struct Patch<const N: usize> {
+    first: usize,
+    gram: [[f64; N]; N],
+    right: [[f64; 3]; N],
+}
+
+impl<const N: usize> Patch<N> {
+    fn new() -> Self {
+        Self { first: 0, gram: [[0.0; N]; N], right: [[0.0; 3]; N] }
+    }
+
+    /// Adds the row `b c = value` of the given weight.
+    #[inline(always)]
+    fn add(&mut self, b: &[f64; N], value: [f64; 3], weight: f64, squares: &mut [f64; 3]) {
+        for i in 0..N {
+            let scaled = weight * b[i];
+            // the lower half too: a fixed length makes vector instructions
+            for j in 0..N {
+                self.gram[i][j] += scaled * b[j];
+            }
+            for axis in 0..3 {
+                self.right[i][axis] += scaled * value[axis];
+            }
+        }
+        for axis in 0..3 {
+            squares[axis] += weight * value[axis] * value[axis];
+        }
+    }
+
+    fn flush(&mut self, normal: &mut Normal) {
+        normal.gram.add_block(self.first, &self.gram);
+        for (to, from) in normal.right[self.first..].iter_mut().zip(&self.right) {
+            (0..3).for_each(|axis| to[axis] += from[axis]);
+        }
+        self.gram.as_flattened_mut().fill(0.0);
+        self.right.as_flattened_mut().fill(0.0);
     }
 }
 
@@ -305,43 +354,30 @@ fn jerk_penalty(n: usize) -> Banded {
     penalty
 }
 
-/// One trial of the penalty's weight.
-struct Trial {
-    cholesky: Cholesky,
-    /// Penalised residual sum of squares by axis.
-    residual: [f64; 3],
-}
-
 impl Normal {
     fn factor(&self, penalty: &Banded, lambda: f64) -> Option<Cholesky> {
-        let mut matrix = self.gram.clone();
-        matrix.add_scaled(lambda, penalty);
-        matrix.cholesky().or_else(|| {
+        let penalised = || {
             let mut matrix = self.gram.clone();
             matrix.add_scaled(lambda, penalty);
+            matrix
+        };
+        penalised().cholesky().or_else(|| {
+            let mut matrix = penalised();
             let largest = (0..matrix.size()).map(|i| matrix.row(i)[0]).fold(0.0, f64::max);
             for i in 0..matrix.size() {
-                matrix.row_mut(i)[0] += RIDGE * largest;
+                matrix.add_to_diagonal(i, RIDGE * largest);
             }
             matrix.cholesky()
         })
     }
 
-    fn trial(&self, penalty: &Banded, lambda: f64) -> Option<Trial> {
-        let cholesky = self.factor(penalty, lambda)?;
-        let mut half = self.right.clone();
-        cholesky.forward(&mut half);
-        // the least value of the penalised sum is z'Wz - |L^-1 B'Wz|^2; rounding keeps 1e-15 of z'Wz
-        let mut residual = self.squares;
-        for row in &half {
-            for (r, v) in residual.iter_mut().zip(row) {
-                *r -= v * v;
-            }
-        }
-        for (r, s) in residual.iter_mut().zip(self.squares) {
-            *r = r.max(1e-14 * s).max(f64::MIN_POSITIVE);
-        }
-        Some(Trial { cholesky, residual })
+    /// The penalised residual sum of squares by axis, `z'Wz - b' A^-1 b`, of which rounding keeps 1e-14 of
+    /// z'Wz; `forms` is the second term.
+    fn residual(&self, forms: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|a| {
+            let floor = (1e-14 * self.squares[a]).max(f64::MIN_POSITIVE);
+            (self.squares[a] - forms[a]).max(floor)
+        })
     }
 
     /// Degrees of freedom of the noise: rows less the unpenalised quadratic.
@@ -357,14 +393,18 @@ fn solve(basis: &GaussianBasis, problem: &Problem<'_>, smoothing: Smoothing) -> 
         Smoothing::Fixed(lambda) => lambda,
         Smoothing::Likelihood => likeliest_lambda(&normal, &penalty, problem.axes),
     };
-    let trial = normal.trial(&penalty, lambda).ok_or(EstimateError::Undetermined {
+    let cholesky = normal.factor(&penalty, lambda).ok_or(EstimateError::Undetermined {
         what: "sff".into(),
         why: "too few of them, or at too few instants",
     })?;
-    let noise_scale = trial.residual.map(|r| r / normal.freedom());
-    let mut coefficients = normal.right;
-    trial.cholesky.solve(&mut coefficients);
-    Ok(Block { coefficients, inverse: trial.cholesky.selected_inverse(), noise_scale, lambda })
+    let mut coefficients = normal.right.clone();
+    cholesky.solve(&mut coefficients);
+    let mut forms = [0.0; 3];
+    for (c, b) in coefficients.iter().zip(&normal.right) {
+        (0..3).for_each(|a| forms[a] += c[a] * b[a]);
+    }
+    let noise_scale = normal.residual(forms).map(|r| r / normal.freedom());
+    Ok(Block { coefficients, inverse: cholesky.selected_inverse(), noise_scale, lambda })
 }
 
 /// The lambda of greatest restricted likelihood, the noise's scale profiled out by axis.
@@ -375,11 +415,13 @@ fn likeliest_lambda(normal: &Normal, penalty: &Banded, axes: &[usize]) -> f64 {
     let unit = normal.gram.trace() / penalty.trace();
     let rank = (penalty.size() - PENALTY_ORDER) as f64;
     let freedom = normal.freedom();
-    let found = scalar::minimise(-8.0, 8.0, 6, 0.05, |exponent| {
+    let found = scalar::minimise(-8.0, 8.0, 5, 0.1, |exponent| {
         let lambda = unit * 10.0_f64.powf(exponent);
-        let Some(trial) = normal.trial(penalty, lambda) else { return f64::INFINITY };
-        let determinant = trial.cholesky.log_determinant() - rank * lambda.ln();
-        axes.iter().map(|&a| freedom * trial.residual[a].ln() + determinant).sum()
+        let tried = normal.gram.log_determinant_and_forms(lambda, penalty, &normal.right);
+        let Some((log_determinant, forms)) = tried else { return f64::INFINITY };
+        let residual = normal.residual(forms);
+        let determinant = log_determinant - rank * lambda.ln();
+        axes.iter().map(|&a| freedom * residual[a].ln() + determinant).sum()
     });
     unit * 10.0_f64.powf(found.x)
 }
@@ -400,44 +442,80 @@ impl Spline {
     /// The noise's scale by axis of the positions' fit: 1 where the sigmas that were given are right.
     #[must_use]
     pub fn noise_scale(&self) -> [f64; 3] {
-        std::array::from_fn(|axis| self.blocks[self.position_block[axis]].noise_scale[axis].sqrt())
+        self.by_axis(|part, axis| part.position.noise_scale[axis].sqrt())
     }
 
     /// The weight of the jerk penalty by axis, 1/m^2.
     #[must_use]
     pub fn lambda(&self) -> [f64; 3] {
-        self.position_block.map(|b| self.blocks[b].lambda)
+        self.by_axis(|part, _| part.position.lambda)
+    }
+
+    fn by_axis(&self, f: impl Fn(&Part, usize) -> f64) -> [f64; 3] {
+        let mut values = [0.0; 3];
+        for part in &self.parts {
+            part.axes.iter().for_each(|&axis| values[axis] = f(part, axis));
+        }
+        values
+    }
+}
+
+impl Block {
+    /// The combination of the functions `row`, from `first` on, by axis.
+    #[inline(always)]
+    fn combine(&self, first: usize, row: &[f64]) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        for (c, b) in self.coefficients[first..].iter().zip(row) {
+            (0..3).for_each(|axis| sum[axis] += c[axis] * b);
+        }
+        sum
+    }
+
+    /// Its standard deviation by axis.
+    #[inline(always)]
+    fn sigma(&self, first: usize, row: &[f64]) -> [f64; 3] {
+        let unit = self.inverse.quadratic_form(first, row).max(0.0);
+        self.noise_scale.map(|scale| (scale * unit).sqrt())
     }
 }
 
 impl Curve for Spline {
     fn at(&self, time_s: f64) -> Option<State> {
-        if !(self.from_s..=self.to_s).contains(&time_s) {
-            return None;
-        }
-        let active = self.basis.at(time_s);
-        let combine = |block: usize, row: &[f64], axis: usize| -> f64 {
-            let rows = self.blocks[block].coefficients[active.first..].iter();
-            rows.zip(row).map(|(c, b)| c[axis] * b).sum()
-        };
-        let mut variances = (usize::MAX, 0.0, 0.0); // of the block last asked, for unit noise
+        (self.from_s..=self.to_s).contains(&time_s).then(|| vectorised(StateAt { spline: self, time_s }))
+    }
+}
+
+/// The state of a spline at an instant within its span.
+struct StateAt<'a> {
+    spline: &'a Spline,
+    time_s: f64,
+}
+
+impl Kernel for StateAt<'_> {
+    type Output = State;
+
+    #[inline(always)]
+    fn run(self) -> State {
+        let Self { spline, time_s } = self;
+        let mut active = Active::default();
+        spline.basis.evaluate(time_s, &mut active);
+        let (first, value, slope) = (active.first, active.value(), active.slope());
         let mut state = State::default();
         let mut acceleration = [0.0; 3];
-        for axis in 0..3 {
-            let (p, v) = (self.position_block[axis], self.velocity_block[axis]);
-            state.position[axis] = self.centre[axis] + combine(p, active.value(), axis); // (7)
-            state.velocity[axis] = combine(v, active.slope(), axis); // (8)
-            acceleration[axis] = combine(v, active.curvature(), axis);
-            let (pb, vb) = (&self.blocks[p], &self.blocks[v]);
-            if variances.0 != p {
-                let position = pb.inverse.quadratic_form(active.first, active.value());
-                let velocity = vb.inverse.quadratic_form(active.first, active.slope());
-                variances = (p, position.max(0.0), velocity.max(0.0));
+        for Part { axes, position, velocity } in &spline.parts {
+            let velocity = velocity.as_ref().unwrap_or(position);
+            let (p, p_sigma) = (position.combine(first, value), position.sigma(first, value)); // (7)
+            let (v, v_sigma) = (velocity.combine(first, slope), velocity.sigma(first, slope)); // (8)
+            let a = velocity.combine(first, active.curvature());
+            for &axis in *axes {
+                state.position[axis] = spline.centre[axis] + p[axis];
+                state.velocity[axis] = v[axis];
+                acceleration[axis] = a[axis];
+                state.position_sigma[axis] = p_sigma[axis];
+                state.velocity_sigma[axis] = v_sigma[axis];
             }
-            state.position_sigma[axis] = (pb.noise_scale[axis] * variances.1).sqrt();
-            state.velocity_sigma[axis] = (vb.noise_scale[axis] * variances.2).sqrt();
         }
         state.acceleration = Some(acceleration);
-        Some(state)
+        state
     }
 }

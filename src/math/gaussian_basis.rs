@@ -12,7 +12,7 @@ pub const WIDTHS: std::ops::RangeInclusive<f64> = 0.8..=1.5;
 const SUPPORT_SIGMAS: f64 = 6.0;
 
 /// Most functions that can be non-zero at one instant.
-const MAX_ACTIVE: usize = 18;
+pub const MAX_ACTIVE: usize = 18;
 
 /// Gaussians on equally spaced knots.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,7 +28,7 @@ pub struct GaussianBasis {
 }
 
 /// The functions that are not zero at one instant, with two derivatives to time.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Active {
     /// Index of the first of them.
     pub first: usize,
@@ -39,20 +39,31 @@ pub struct Active {
 }
 
 impl Active {
+    /// Values and first derivatives, the first N of them (at most [`MAX_ACTIVE`]), zeros behind the last.
+    #[must_use]
+    #[inline(always)]
+    pub fn padded<const N: usize>(&self) -> [&[f64; N]; 2] {
+        const { assert!(N <= MAX_ACTIVE) };
+        [&self.value, &self.slope].map(|all| all.first_chunk().unwrap_or(&[0.0; N]))
+    }
+
     /// Values of the functions `first ..`.
     #[must_use]
+    #[inline(always)]
     pub fn value(&self) -> &[f64] {
         &self.value[..self.count]
     }
 
     /// Their first derivatives, 1/s.
     #[must_use]
+    #[inline(always)]
     pub fn slope(&self) -> &[f64] {
         &self.slope[..self.count]
     }
 
     /// Their second derivatives, 1/s^2.
     #[must_use]
+    #[inline(always)]
     pub fn curvature(&self) -> &[f64] {
         &self.curvature[..self.count]
     }
@@ -99,40 +110,44 @@ impl GaussianBasis {
 
     /// The functions that are not zero at `t_s`; none outside the knots' reach.
     #[must_use]
-    #[inline]
     pub fn at(&self, t_s: f64) -> Active {
-        let mut active = Active {
-            first: 0,
-            count: 0,
-            value: [0.0; MAX_ACTIVE],
-            slope: [0.0; MAX_ACTIVE],
-            curvature: [0.0; MAX_ACTIVE],
-        };
+        let mut active = Active::default();
+        self.evaluate(t_s, &mut active);
+        active
+    }
+
+    /// As [`Self::at`], into what an earlier evaluation left: many of them need not clear and move memory.
+    #[inline(always)]
+    pub fn evaluate(&self, t_s: f64, active: &mut Active) {
+        let before = active.count;
         let u = (t_s - self.first_knot_s) / self.spacing_s;
         let below = u.floor();
         let leading = below as i64 - (self.reach as i64 - 1);
-        let skip = usize::try_from(-leading).unwrap_or(0);
-        active.first = usize::try_from(leading).unwrap_or(0);
-        if skip >= 2 * self.reach || active.first >= self.count {
-            return active;
-        }
+        let skip = usize::try_from(-leading).unwrap_or(0).min(2 * self.reach);
+        active.first = usize::try_from(leading).unwrap_or(0).min(self.count);
         active.count = (2 * self.reach - skip).min(self.count - active.first);
-        // exp(-(f - j)^2 / 2 s^2) = exp(-f^2 / 2 s^2) exp(f / s^2)^j exp(-j^2 / 2 s^2): three calls of exp
+        // exp(-(f - j)^2 / 2 s^2) = exp(-f^2 / 2 s^2) exp(f / s^2)^j exp(-j^2 / 2 s^2): two calls of exp
         let f = u - below;
         let per_square = 1.0 / (self.width * self.width);
         let ratio = (f * per_square).exp();
         let start = skip as f64 - (self.reach as f64 - 1.0);
         let mut power = (f * per_square * (start - 0.5 * f)).exp();
         let (per_h, per_h2) = (per_square / self.spacing_s, per_square / self.spacing_s.powi(2));
-        for i in 0..active.count {
-            let x = f - (start + i as f64);
-            let b = power * self.table[skip + i];
-            active.value[i] = b;
-            active.slope[i] = -x * per_h * b;
-            active.curvature[i] = (x * x * per_square - 1.0) * per_h2 * b;
+        let n = active.count;
+        let (value, slope, curvature) =
+            (&mut active.value[..n], &mut active.slope[..n], &mut active.curvature[..n]);
+        for (b, peak) in value.iter_mut().zip(&self.table[skip..]) {
+            *b = power * peak;
             power *= ratio;
         }
-        active
+        for i in 0..n {
+            let x = f - start - i as i32 as f64;
+            slope[i] = -x * per_h * value[i];
+            curvature[i] = (x * x * per_square - 1.0) * per_h2 * value[i];
+        }
+        for i in active.count..before {
+            (active.value[i], active.slope[i], active.curvature[i]) = (0.0, 0.0, 0.0);
+        }
     }
 }
 

@@ -6,3 +6,4 @@ pub mod gaussian_basis;
 pub mod least_squares;
 pub mod robust;
 pub mod scalar;
+pub mod simd;

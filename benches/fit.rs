@@ -1,0 +1,49 @@
+//! Cost of the SFF fit a sample: positions and velocities on three axes, the penalty's weight found, the
+//! posterior sigma at every sample. It should not depend on the number of samples.
+
+use criterion::{BenchmarkId, Criterion, SamplingMode, Throughput, criterion_group, criterion_main};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use trackfuse::estimate::spline::{self, Settings};
+use trackfuse::sample::{Sample, Source};
+use trackfuse::track::Curve;
+
+/// A source at 100 Hz with noise of 0.1 m and 0.1 m/s.
+fn source(samples: usize) -> Source {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut series = |f: fn(f64) -> f64| {
+        (0..samples)
+            .map(|i| {
+                let time_s = i as f64 * 0.01;
+                let value = std::array::from_fn(|axis| {
+                    let noise: f64 = StandardNormal.sample(&mut rng);
+                    5.0 * f(0.7 * time_s + axis as f64) + 0.1 * noise
+                });
+                Sample { time_s, value, sigma: [0.1; 3] }
+            })
+            .collect()
+    };
+    Source { name: "bench".into(), positions: series(f64::sin), velocities: series(|x| 0.7 * f64::cos(x)) }
+}
+
+fn fit(c: &mut Criterion) {
+    let mut group = c.benchmark_group("sff");
+    group.sample_size(10).sampling_mode(SamplingMode::Flat);
+    for samples in [1_000, 10_000, 100_000, 1_000_000] {
+        let sources = [source(samples)];
+        let end_s = sources[0].span_s().map_or(0.0, |s| s.1);
+        group.throughput(Throughput::Elements(samples as u64));
+        group.bench_with_input(BenchmarkId::new("fit and evaluate", samples), &sources, |b, sources| {
+            b.iter(|| {
+                let fitted = spline::fit(sources, 0.0, end_s, &Settings::default()).expect("a good problem");
+                let states = sources[0].positions.iter().filter_map(|s| fitted.at(s.time_s));
+                states.map(|s| s.position[2] + s.position_sigma[2]).sum::<f64>()
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, fit);
+criterion_main!(benches);
