@@ -3,7 +3,7 @@
 //! 1. Who sees what when ([`coverage`]); a silence longer than `bridge_max_s` cuts the log into pieces.
 //! 2. Each piece is fitted by the method that was asked for.
 //! 3. Where sources overlap they are held against each other ([`agreement`]); while they aren't
-//!    registered, what they differ by widens every band.
+//!    registered, what they differ by widens the bands.
 //! 4. The last piece is carried on ([`extrapolation`]), and once more the paper's plain way.
 //! 5. Characteristic points are looked up on the track.
 
@@ -29,6 +29,8 @@ pub struct Plan {
     pub frame_id: String,
     /// Points of the track a second.
     pub rate_hz: f64,
+    /// Index of the source whose errors are zero by definition.
+    pub datum: usize,
     /// The estimator.
     pub method: Method,
     /// SFF and PCF: whether velocity is the derivative of position.
@@ -127,11 +129,15 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
     let systematic = Quantity::ALL.map(|q| agreement::systematic_sigma(&disagreements, q));
     warn_of_disagreement(sources, &coverage, &disagreements, &mut warnings);
 
+    let disagree = disagreements.iter().any(Disagreement::is_significant);
     let point = |piece: &dyn Curve, time_s: f64, phase, method, seen_by| {
         let mut state = piece.at(time_s)?;
-        for axis in 0..3 {
-            state.position_sigma[axis] = state.position_sigma[axis].hypot(systematic[0][axis]);
-            state.velocity_sigma[axis] = state.velocity_sigma[axis].hypot(systematic[1][axis]);
+        // what the datum sees alone is safe from the others, unless they pull the curve away from it
+        if disagree || seen_by != 1 << plan.datum {
+            for axis in 0..3 {
+                state.position_sigma[axis] = state.position_sigma[axis].hypot(systematic[0][axis]);
+                state.velocity_sigma[axis] = state.velocity_sigma[axis].hypot(systematic[1][axis]);
+            }
         }
         let time = plan.origin.plus_seconds(time_s);
         Some(TrackPoint { time, state, phase, method, seen_by })

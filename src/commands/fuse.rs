@@ -111,6 +111,7 @@ fn plan(config: &Config, loaded: &[Loaded], sources: &[Source], datum: usize, or
         origin,
         frame_id: output.frame_id.clone().unwrap_or_else(own_frame),
         rate_hz,
+        datum,
         method: match fuse.method {
             config::FusionMethod::Gdf => Method::WeightedMean,
             config::FusionMethod::Pcf => Method::Polynomial,

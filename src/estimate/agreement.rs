@@ -109,15 +109,15 @@ fn lag_one_correlation(values: &[f64]) -> f64 {
     if squares > 0.0 { products / squares } else { 0.0 }
 }
 
-/// By axis, the systematic part of the largest significant difference in `quantity`, its own noise taken
-/// off; 0 where all agree. What a track's band must be widened by until the sources are registered.
+/// By axis, the largest difference in `quantity` between any two sources, but no less than that difference's
+/// own sigma: a systematic error of this size can't be excluded. What a track's band must be widened by until
+/// the sources are registered; 0 where no two were compared.
 #[must_use]
 pub fn systematic_sigma(disagreements: &[Disagreement], quantity: Quantity) -> [f64; 3] {
     let mut widest = [0.0_f64; 3];
-    for d in disagreements.iter().filter(|d| d.quantity == quantity && d.is_significant()) {
+    for d in disagreements.iter().filter(|d| d.quantity == quantity) {
         for axis in 0..3 {
-            let excess = d.median[axis].powi(2) - d.sigma[axis].powi(2);
-            widest[axis] = widest[axis].max(excess.max(0.0).sqrt());
+            widest[axis] = widest[axis].max(d.median[axis].abs()).max(d.sigma[axis]);
         }
     }
     widest
@@ -151,7 +151,8 @@ mod tests {
             let found = compare(&[source(seed, 0.0, 0.0, 0.02), source(seed + 1000, 0.0, 1.0, 0.05)]);
             assert_eq!(found.len(), 1);
             assert!(!found[0].is_significant(), "{found:?}");
-            assert_eq!(systematic_sigma(&found, Quantity::Position), [0.0; 3]);
+            let systematic = systematic_sigma(&found, Quantity::Position);
+            assert!(systematic.iter().all(|s| (0.01..0.2).contains(s)), "{systematic:?}");
         }
     }
 
@@ -167,6 +168,8 @@ mod tests {
 
     #[test]
     fn sources_that_never_meet_are_not_compared() {
-        assert!(compare(&[source(1, 0.0, 0.0, 0.02), source(2, 9.0, 5.0, 0.02)]).is_empty());
+        let found = compare(&[source(1, 0.0, 0.0, 0.02), source(2, 9.0, 5.0, 0.02)]);
+        assert!(found.is_empty());
+        assert_eq!(systematic_sigma(&found, Quantity::Position), [0.0; 3]);
     }
 }
