@@ -355,7 +355,10 @@ impl Config {
             range(ok, key.into(), format!("{:?}", value.unwrap_or_default()), "a positive number")
         };
         let (output, fusion, beyond) = (&self.output, &self.fusion, &self.extrapolation);
-        let prefix_ok = output.prefix.starts_with('/') && !output.prefix.ends_with('/');
+        let plain = |c: char| c.is_alphanumeric() || "/_-.".contains(c);
+        let prefix_ok = output.prefix.starts_with('/')
+            && !output.prefix.ends_with('/')
+            && output.prefix.chars().all(plain);
         range(prefix_ok, "output.prefix".into(), format!("{:?}", output.prefix), "\"/name\"")?;
         positive("output.rate_hz", output.rate_hz)?;
         range(

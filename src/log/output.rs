@@ -119,11 +119,13 @@ pub(super) fn check_output(log: &Log, out: &Path, force: bool) -> Result<(), Log
 
 fn check_name(out: &Path, force: bool) -> Result<(), LogError> {
     let path = || out.to_owned();
+    let cannot = |why: String| Err(LogError::Write { path: path(), source: io::Error::other(why) });
+    if !directory(out).is_dir() {
+        return cannot(format!("there is no folder {:?}", directory(out)));
+    }
     match fs::symlink_metadata(out) {
+        Ok(found) if found.is_dir() => cannot("it is a directory".into()),
         Ok(_) if !force => Err(LogError::OutputExists { path: path() }),
-        Ok(found) if found.is_dir() => {
-            Err(LogError::Write { path: path(), source: io::ErrorKind::IsADirectory.into() })
-        }
         _ => Ok(()),
     }
 }
