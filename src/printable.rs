@@ -25,7 +25,7 @@ pub(crate) fn toml_string(text: &str) -> String {
     for c in text.chars() {
         match c {
             '"' | '\\' => quoted.extend(['\\', c]),
-            c if harmful(c) => quoted.push_str(&format!("\\u{:04X}", u32::from(c))),
+            c if harmful(c) => quoted.extend(["\\u", &format!("{:04X}", u32::from(c))]),
             c => quoted.push(c),
         }
     }

@@ -161,7 +161,8 @@ const MAX_POINTS_PER_SAMPLE: f64 = 100.0;
 /// Points a second, such that the track stays of a size that can be read.
 fn rate_hz(config: &Config, sources: &[Source], warnings: &mut Vec<String>) -> Result<f64, CommandError> {
     let pieces = coverage::Coverage::of(sources).pieces(config.fusion.bridge_max_s);
-    let span_s = pieces.iter().map(|p| p.1 - p.0).sum::<f64>() + config.extrapolation.horizon_s;
+    let seen_s: f64 = pieces.iter().map(|p| p.1 - p.0).sum();
+    let span_s = seen_s + config.extrapolation.horizon_s;
     if let Some(rate_hz) = config.output.rate_hz {
         let points = rate_hz * span_s;
         return if points <= MAX_POINTS {
@@ -172,11 +173,11 @@ fn rate_hz(config: &Config, sources: &[Source], warnings: &mut Vec<String>) -> R
     }
     let rate_hz = fusion::fastest_rate_hz(sources).unwrap_or(1.0);
     let samples: usize = sources.iter().map(Source::len).sum();
-    let most = MAX_POINTS.min(1000.0 + MAX_POINTS_PER_SAMPLE * samples as f64);
-    if rate_hz * span_s <= most {
+    let for_samples = 1000.0 + MAX_POINTS_PER_SAMPLE * samples as f64;
+    let lowered = rate_hz.min(for_samples / seen_s).min(MAX_POINTS / span_s);
+    if lowered == rate_hz {
         return Ok(rate_hz);
     }
-    let lowered = most / span_s;
     warnings.push(format!(
         "the median interval of the fastest source asks for {rate_hz:.2} points a second over {span_s:.0} s: lowered \
          to {lowered:.2}; set `output.rate_hz` for another rate"

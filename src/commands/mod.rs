@@ -72,7 +72,7 @@ pub enum CommandError {
         /// The file.
         path: String,
         /// What is wrong with it.
-        error: SimulateError,
+        error: Box<SimulateError>,
     },
     /// A file that is no log.
     #[error("{path}: {source}")]
@@ -104,9 +104,8 @@ impl CommandError {
             Self::Config(_) | Self::TooManyPoints { .. } | Self::File { .. } => true,
             Self::Source(SourceError::Log(error)) | Self::Log(error) => is_usage(error),
             Self::Source(error) => error.is_usage(),
-            Self::Simulate(error) | Self::Scenario { error, .. } => {
-                !matches!(error, SimulateError::Diverged { .. } | SimulateError::Log(_))
-            }
+            Self::Simulate(error) => is_of_scenario(error),
+            Self::Scenario { error, .. } => is_of_scenario(error),
             Self::Estimate(_) | Self::NotFinite { .. } => false,
         };
         if usage { 2 } else { 1 }
@@ -118,6 +117,10 @@ fn is_usage(error: &LogError) -> bool {
         error,
         LogError::OutputExists { .. } | LogError::OutputIsInput { .. } | LogError::TopicTaken { .. }
     )
+}
+
+fn is_of_scenario(error: &SimulateError) -> bool {
+    !matches!(error, SimulateError::Diverged { .. } | SimulateError::Log(_))
 }
 
 impl From<Outcome> for ExitCode {

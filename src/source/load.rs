@@ -139,7 +139,7 @@ pub fn load(
     })?;
     let (mut dropped, mut first_error) = (Vec::new(), None);
     for source in &mut gathered {
-        while let Err((quantity, error)) = source.check() {
+        while let Some((quantity, error)) = source.lack() {
             if named {
                 return Err(error);
             }
@@ -213,19 +213,20 @@ impl Gathered {
         }
     }
 
-    /// An error where a path gave nothing at all, or all samples are of one instant.
-    fn check(&mut self) -> Result<(), (Option<Quantity>, SourceError)> {
+    /// What stands against using it, and the quantity at fault where it is one: a path that gave nothing at
+    /// all, or samples that are all of one instant.
+    fn lack(&mut self) -> Option<(Option<Quantity>, SourceError)> {
         let name = self.config.name.clone();
         if let Some((count, _)) = self.undecodable
             && count == self.messages
             && let Some((_, error)) = self.undecodable.take()
         {
             let topic = self.paths.first().map_or(String::new(), |(_, p)| p.topic.clone());
-            return Err((None, SourceError::Decode { name, topic, error }));
+            return Some((None, SourceError::Decode { name, topic, error }));
         }
         if self.untimed > 0 && self.clocks == [0; 3] {
             let (choice, count) = (self.config.time, self.untimed);
-            return Err((None, SourceError::NoTime { name, choice, count }));
+            return Some((None, SourceError::NoTime { name, choice, count }));
         }
         for (quantity, path) in &self.paths {
             let q = *quantity as usize;
@@ -233,25 +234,29 @@ impl Gathered {
                 continue;
             }
             let (found, fits) = match self.first_fault[q].take() {
-                Some(Fault::Miss(miss)) => return Err((Some(*quantity), SourceError::Miss { name, miss })),
-                Some(Fault::NoVector { kind, fits }) => (kind.to_owned(), fits),
-                Some(fault) => (fault.description().unwrap_or_default().to_owned(), Vec::new()),
+                Some(Fault::Miss(miss)) => return Some((Some(*quantity), SourceError::Miss { name, miss })),
+                Some(Fault::NoOrientation) => {
+                    let path = path.to_string();
+                    return Some((Some(*quantity), SourceError::NoOrientation { name, path }));
+                }
+                Some(Fault::NoVector { kind, fits }) => (kind, fits),
+                Some(fault) => (fault.description().unwrap_or_default(), Vec::new()),
                 None => {
                     let topic = path.topic.clone();
-                    return Err((Some(*quantity), SourceError::Empty { name, topic }));
+                    return Some((Some(*quantity), SourceError::Empty { name, topic }));
                 }
             };
-            let spare = (self.paths.len() > 1 && *quantity == Quantity::Velocity).then_some("velocity");
+            let spare = self.paths.len() > 1 && *quantity == Quantity::Velocity;
             let (path, count) = (path.to_string(), self.messages);
             let error = SourceError::NoVector { name, path, found, fits, spare, count };
-            return Err((Some(*quantity), error));
+            return Some((Some(*quantity), error));
         }
         let times = || self.readings.iter().flatten().map(|r| r.time);
         match (times().min(), times().max(), times().count()) {
             (Some(time), Some(last), count) if count > 2 && time == last => {
-                Err((None, SourceError::OneInstant { name, time, count }))
+                Some((None, SourceError::OneInstant { name, time, count }))
             }
-            _ => Ok(()),
+            _ => None,
         }
     }
 

@@ -47,8 +47,8 @@ pub enum SourceError {
     },
     /// A velocity in the body frame, with nothing to turn it by.
     #[error(
-        "source {name:?}: {} is in the body frame, but its messages hold no orientation beside a position to turn \
-         it by",
+        "source {name:?}: {} is in the body frame, but its messages hold no orientation (a unit quaternion) beside a \
+         position to turn it by",
         printable(path)
     )]
     NoOrientation {
@@ -105,11 +105,11 @@ pub enum SourceError {
         /// The path.
         path: String,
         /// What is there in the first message.
-        found: String,
+        found: &'static str,
         /// Paths from there on that lead to a vector.
         fits: Vec<String>,
-        /// The key that the source can do without, since it has the other.
-        spare: Option<&'static str>,
+        /// Whether it is a velocity, which the source can do without.
+        spare: bool,
         /// Number of messages.
         count: usize,
     },
@@ -168,8 +168,8 @@ impl SourceError {
                 let fits: Vec<_> = fits.iter().map(|path| format!("`{}`", printable(path))).collect();
                 format!("a vector stands at {}", fits.join(", "))
             }
-            Self::NoVector { spare: Some(key), .. } => {
-                format!("leave `{key}` out of this source's table in the config to do without it")
+            Self::NoVector { spare: true, .. } => {
+                "leave `velocity` out of this source's table in the config to do without it".into()
             }
             Self::NoTime { .. } | Self::OneInstant { .. } => {
                 "`time = \"publish\"` or `time = \"log\"` in this source takes another clock".into()

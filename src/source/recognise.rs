@@ -19,6 +19,9 @@ const OTHER_WORDS: [(&str, bool); 4] =
 /// Topics with one of these words hold what a track is judged by, never what it is made of.
 const REFERENCE_WORDS: [&str; 4] = ["truth", "reference", "ins", "gt"];
 
+/// Schemas of an earlier run's results.
+const OWN_SCHEMAS: [&str; 2] = ["trackfuse.TrackPoint", "trackfuse.CharacteristicPoint"];
+
 /// Where the usual messages keep a position, the most specific first.
 const POSITION_FIELDS: [&str; 5] = ["pose.pose.position", "pose.position", "position", "point", "vector"];
 
@@ -72,21 +75,19 @@ pub struct Choice {
 /// The text of a config with these sources; the first that looks like a datum is it, else the first.
 pub(super) fn config_of(choices: &[Choice]) -> String {
     let datum = choices.iter().position(|c| is_datum_like(&c.name)).unwrap_or(0);
-    let mut text = String::new();
-    for (i, choice) in choices.iter().enumerate() {
-        text.push_str(&format!("[[source]]\nname = {}\n", toml_string(&choice.name)));
+    let tables = choices.iter().enumerate().map(|(i, choice)| {
+        let mut lines = vec!["[[source]]".to_owned(), format!("name = {}", toml_string(&choice.name))];
         for (key, paths) in [("position", &choice.positions), ("velocity", &choice.velocities)] {
-            for (j, path) in paths.iter().enumerate() {
-                let or = if j == 0 { "" } else { "# " };
-                text.push_str(&format!("{or}{key} = {}\n", toml_string(path)));
-            }
+            let or = |j: usize| if j == 0 { "" } else { "# " };
+            let keys = paths.iter().enumerate();
+            lines.extend(keys.map(|(j, path)| format!("{}{key} = {}", or(j), toml_string(path))));
         }
         if i == datum && choices.len() > 1 {
-            text.push_str("datum = true\n");
+            lines.push("datum = true".to_owned());
         }
-        text.push('\n');
-    }
-    text
+        lines.join("\n") + "\n"
+    });
+    tables.collect::<Vec<_>>().join("\n")
 }
 
 /// The candidates as a config would name them: each by its topic's first part, and a number where that is taken.
@@ -188,7 +189,7 @@ fn candidates(log: &Log, prefix: &str) -> Result<(Vec<Candidate>, Unusable), Sou
         let (encoding, name, data) =
             schema.map_or(("", "", &[][..]), |s| (s.encoding.as_str(), s.name.as_str(), s.data.as_slice()));
         let topic = channel.topic.as_str();
-        if topic.starts_with(&format!("{prefix}/")) || name.starts_with("trackfuse.") {
+        if topic.starts_with(&format!("{prefix}/")) || OWN_SCHEMAS.contains(&name) {
             unusable.insert(topic, "written by trackfuse".to_owned());
         } else if is_reference(topic) {
             unusable.insert(topic, "by its name a reference, which a track is judged by".to_owned());

@@ -95,9 +95,11 @@ fn exit_code_2_for_a_config_that_is_wrong_and_the_message_says_where() {
             &["trial.toml: line 2: unknown field `rate`", "hint: did you mean `rate_hz`?"][..],
         ),
         ("[output\n", &["trial.toml: line 1"]),
-        ("[output]\nrate_hz = \"fast\"\n", &["trial.toml: line 2", "expected f64"]),
+        ("[output]\nrate_hz = \"fast\"\n", &["trial.toml: line 2", "expected a number"]),
         ("[fusion]\norder = 0\n", &["fusion.order is 0, expected 1 to 48"]),
         ("[output]\nprefix = \"fused\"\n", &["output.prefix is \"fused\", expected \"/name\""]),
+        ("[source]\nname = \"a\"\n", &["trial.toml: line 1", "list of tables", "hint: two brackets"]),
+        ("[fusion]\nestimate = \"al\"\n", &["trial.toml: line 2: expected \"auto\" or []"]),
     ];
     for (text, parts) in cases {
         assert_says(&Trial::of(two_sensors()).config(text).error(2), parts);
@@ -130,9 +132,9 @@ fn exit_code_1_for_an_output_that_cannot_be_written() {
     let trial = Trial::of(two_sensors());
     fs::create_dir(trial.path("folder")).unwrap();
     for (name, says) in [
-        ("no/such/out.mcap", "no folder \"no/such\""),
+        ("no/such/out.mcap", "no folder no/such"),
         ("folder", "is a directory"),
-        ("in.mcap/out.mcap", "no folder \"in.mcap\""),
+        ("in.mcap/out.mcap", "no folder in.mcap"),
     ] {
         for force in [&[][..], &["--force"]] {
             let ran = trial.fuse(&[&["-o", name], force].concat());
@@ -140,6 +142,19 @@ fn exit_code_1_for_an_output_that_cannot_be_written() {
             assert_says(&ran.stderr, &["cannot write", name, says]);
         }
     }
+}
+
+#[cfg(unix)]
+#[test]
+fn exit_code_1_for_an_output_that_is_a_device_which_force_must_not_replace() {
+    let trial = Trial::of(two_sensors());
+    let _listening = std::os::unix::net::UnixListener::bind(trial.path("socket")).unwrap();
+    for force in [&[][..], &["--force"]] {
+        let ran = trial.fuse(&[&["-o", "socket"], force].concat());
+        assert_eq!(ran.code, 1, "{ran:#?}");
+        assert_says(&ran.stderr, &["cannot write \"socket\": it is no regular file"]);
+    }
+    assert!(!trial.path("socket").is_file());
 }
 
 #[test]

@@ -9,7 +9,8 @@ use super::trial::trackfuse;
 fn block<'t>(text: &'t str, language: &str) -> &'t str {
     let start = format!("\n```{language}\n");
     let from = text.find(&start).expect("a block") + start.len();
-    &text[from..from + text[from..].find("\n```").expect("its end") + 1]
+    let len = text[from..].find("```\n").expect("its end");
+    &text[from..][..len]
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::trial::{Output, Trial, assert_says};
+use super::trial::{Trial, assert_says};
 use super::trial_log::{
     Cdr, POSE_STAMPED, Sensor, TWIST_STAMPED, TrialLog, changed, definition, ns, odometry,
     odometry_definition, position, stamp, two_sensors, velocity, xyz,
@@ -119,7 +119,7 @@ fn odometry_log(turn: [f64; 4]) -> Vec<u8> {
     let mut log = TrialLog::new();
     log.channel("/beacon/odom", "cdr", ("nav_msgs/msg/Odometry", "ros2msg", &odometry_definition()));
     for (t, p, _) in (Sensor { sigma: 0.01, ..Sensor::new(0.0, 8.0, 1) }).samples() {
-        log.raw("/beacon/odom", [ns(t); 2], &odometry(ns(t), p, turn, velocity(t), [0.04, 0.09]));
+        log.raw("/beacon/odom", [ns(t); 2], &odometry(ns(t), p, turn, velocity(t), [0.04, 0.25]));
     }
     log.finish()
 }
@@ -155,23 +155,39 @@ fn sources_take_their_sigmas_from_the_config_else_the_messages_else_their_scatte
     );
     assert_eq!(
         (&source["velocity_sigma_m_s"], &source["velocity_sigma_from"]),
-        (&json!(0.3), &json!("messages"))
+        (&json!(0.5), &json!("messages"))
     );
     let config = "[[source]]\nname = \"beacon\"\nposition = \"/beacon/odom.pose.pose.position\"\n\
                   position_sigma_m = 0.7\n";
-    let (report, wide) = Trial::of(odometry_log(none)).config(config).report(0);
+    let (report, _) = Trial::of(odometry_log(none)).config(config).report(0);
     let source = &report["sources"][0];
     assert_eq!(
         (&source["position_sigma_m"], &source["position_sigma_from"]),
         (&json!(0.7), &json!("config"))
     );
     assert_eq!(source["velocity"], Value::Null);
-    let narrow = Trial::of(odometry_log(none)).config(&config.replace("0.7", "0.07")).report(0).1;
-    let sigma = |o: &Output| o.near(4.0).vector("position_sigma")[0];
-    assert!((sigma(&wide) / sigma(&narrow) - 10.0).abs() < 1.0, "{} {}", sigma(&wide), sigma(&narrow));
     let (report, _) = Trial::of(two_sensors()).report(0);
     assert_eq!(report["sources"][0]["position_sigma_from"], "estimated");
     assert!((report["sources"][0]["position_sigma_m"].as_f64().unwrap() - 0.1).abs() < 0.02);
+}
+
+#[test]
+fn sources_pull_the_track_towards_them_by_their_sigmas() {
+    let mut log = TrialLog::new();
+    log.sensor("/tether/track", &Sensor::new(0.0, 8.0, 1));
+    log.sensor("/beacon/track", &Sensor { bias_m: [2.0, 0.0, 0.0], ..Sensor::new(0.0, 8.0, 2) });
+    let log = log.finish();
+    let x = |tether_m: f64, beacon_m: f64, code: i32| {
+        let config = format!(
+            "[[source]]\nname = \"tether\"\nposition = \"/tether/track.position\"\nposition_sigma_m = {tether_m:?}\n\
+             [[source]]\nname = \"beacon\"\nposition = \"/beacon/track.position\"\nposition_sigma_m = {beacon_m:?}\n"
+        );
+        let output = Trial::of(&log).config(&config).report(code).1;
+        output.near(4.0).vector("position")[0] - position(4.0)[0]
+    };
+    assert!(x(0.1, 10.0, 0).abs() < 0.2);
+    assert!((x(10.0, 0.1, 0) - 2.0).abs() < 0.2);
+    assert!((x(0.1, 0.1, 3) - 1.0).abs() < 0.2);
 }
 
 /// A config of the tether alone, with more keys.
