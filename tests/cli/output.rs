@@ -75,6 +75,10 @@ fn output_metadata_tell_the_input_and_hold_a_config_that_makes_the_same_track_ag
     assert_eq!(metadata["input_size"], fs::metadata(trial.path("in.mcap")).unwrap().len().to_string());
     assert_eq!(metadata["input_data_section_crc"].len(), 8);
     assert_eq!(metadata["input_summary_sha256"].len(), 64);
+    assert_says(
+        &metadata["config"],
+        &["name = \"tether\"", "position = \"/beacon/track.position\"", "datum = true"],
+    );
     let again = Trial::of(two_sensors()).config(&metadata["config"]).report(0).1;
     assert_eq!(again.track().len(), output.track().len());
     assert!(again.track().iter().zip(output.track()).all(|(a, b)| a.value == b.value));
