@@ -47,6 +47,9 @@ impl ConfigError {
     pub fn hint(&self) -> Option<String> {
         match self {
             Self::Syntax { nearest: Some(key), .. } => Some(format!("did you mean `{key}`?")),
+            Self::Syntax { message, .. } if message.ends_with("expected a list of tables") => {
+                Some("two brackets begin an entry of a list: `[[source]]`, `[[characteristic_point]]`".into())
+            }
             _ => None,
         }
     }
@@ -333,7 +336,7 @@ impl Config {
     pub fn parse(text: &str, path: &Path) -> Result<Self, ConfigError> {
         let config: Self = toml::from_str(text).map_err(|error| {
             let line = error.span().map(|s| 1 + text[..s.start].matches('\n').count());
-            let message = error.message().replace('\n', " ");
+            let message = plain_words(&error.message().replace('\n', " "));
             let nearest = nearest_key(&message);
             let message = line.map_or(message.clone(), |line| format!("line {line}: {message}"));
             ConfigError::Syntax { path: path.to_owned(), message, nearest }
@@ -355,7 +358,10 @@ impl Config {
             range(ok, key.into(), format!("{:?}", value.unwrap_or_default()), "a positive number")
         };
         let (output, fusion, beyond) = (&self.output, &self.fusion, &self.extrapolation);
-        let prefix_ok = output.prefix.starts_with('/') && !output.prefix.ends_with('/');
+        let plain = |c: char| c.is_alphanumeric() || "/_-.".contains(c);
+        let prefix_ok = output.prefix.starts_with('/')
+            && !output.prefix.ends_with('/')
+            && output.prefix.chars().all(plain);
         range(prefix_ok, "output.prefix".into(), format!("{:?}", output.prefix), "\"/name\"")?;
         positive("output.rate_hz", output.rate_hz)?;
         range(
@@ -421,6 +427,20 @@ impl Config {
         }
         Ok(())
     }
+}
+
+/// The parser's message without the words of its trade.
+fn plain_words(message: &str) -> String {
+    if message.contains("untagged enum Registration") {
+        return "expected \"auto\" or []".into();
+    }
+    let words = [
+        ("invalid type: map, expected a sequence", "found one table, expected a list of tables"),
+        ("expected f64", "expected a number"),
+        ("expected usize", "expected a whole number"),
+        ("expected i64", "expected a whole number"),
+    ];
+    words.iter().fold(message.to_owned(), |text, (trade, plain)| text.replace(trade, plain))
 }
 
 /// Of an unknown key's message "unknown field `x`, expected one of `a`, `b`": the expected one nearest to x.

@@ -8,6 +8,7 @@ pub mod estimate;
 pub mod fusion;
 pub mod log;
 pub mod math;
+mod printable;
 pub mod publish;
 pub mod report;
 pub mod sample;

@@ -18,7 +18,7 @@ use crate::report::{self, Report};
 use crate::sample::Source;
 use crate::source::{self, Candidate, Loaded};
 use crate::time::Time;
-use crate::track::Method;
+use crate::track::{Method, TrackPoint};
 
 /// Fuses a log's sources and writes the track beside them.
 ///
@@ -35,17 +35,22 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     let channels = Topic::ALL.map(|topic| topic.channel(&config.output.prefix));
     Appender::check(&log, &output, args.force, &channels)?;
 
-    let unused = choose_sources(&log, &mut config)?;
-    let (loaded, origin) = source::load(&log, &config.source)?;
-    let sources: Vec<Source> = loaded.iter().map(|l| l.source.clone()).collect();
+    let named = !config.source.is_empty();
+    let (unused, mut warnings) = choose_sources(&log, &mut config)?;
+    let (loaded, origin, left_out) = source::load(&log, &config.source, named)?;
+    warnings.extend(left_out);
+    config.source = loaded.iter().map(|l| l.config.clone()).collect();
     let datum = source::datum(&config.source);
-    let plan = plan(&config, &loaded, &sources, datum, origin);
+    config.source[datum].datum = true;
+    let sources: Vec<Source> = loaded.iter().map(|l| l.source.clone()).collect();
+    let plan = plan(&config, &loaded, &sources, datum, origin, &mut warnings)?;
     let fusion = fusion::fuse(&sources, &plan)?;
+    check_finite(&fusion)?;
 
     let t0 =
         config.output.t0_ns.map_or_else(|| first_sample(&sources[datum], &fusion, origin), Time::from_ns);
     let shift_s = log_time_shift_s(&loaded[datum]);
-    let warnings = warnings(&loaded, &fusion, shift_s);
+    warnings.extend(warnings_of(&loaded, datum, &fusion, shift_s));
     let (input_name, output_name) = (args.log.display().to_string(), output.display().to_string());
     let report = Report::new(&report::Parts {
         input: &input_name,
@@ -90,24 +95,30 @@ fn beside(log: &Path) -> PathBuf {
     log.with_file_name(name)
 }
 
-/// Fills in the sources where the config names none, and returns the channels that were passed over.
-fn choose_sources(log: &Log, config: &mut Config) -> Result<Vec<Candidate>, CommandError> {
-    if config.source.is_empty() {
-        let recognised = source::recognise(log, &config.output.prefix)?;
-        config.source = recognised.sources;
-        return Ok(recognised.unused);
+/// Fills in the sources where the config names none, and returns the channels that were passed over, with
+/// what is to be said of them.
+fn choose_sources(log: &Log, config: &mut Config) -> Result<(Vec<Candidate>, Vec<String>), CommandError> {
+    if !config.source.is_empty() {
+        return Ok((Vec::new(), Vec::new()));
     }
-    let datum = source::datum(&config.source);
-    config.source[datum].datum = true;
-    Ok(Vec::new())
+    let recognised = source::recognise(log, &config.output.prefix)?;
+    config.source = recognised.sources;
+    Ok((recognised.unused, recognised.warnings))
 }
 
 /// Every default of the config, resolved for these sources.
-fn plan(config: &Config, loaded: &[Loaded], sources: &[Source], datum: usize, origin: Time) -> Plan {
+fn plan(
+    config: &Config,
+    loaded: &[Loaded],
+    sources: &[Source],
+    datum: usize,
+    origin: Time,
+    warnings: &mut Vec<String>,
+) -> Result<Plan, CommandError> {
     let (output, fuse, beyond) = (&config.output, &config.fusion, &config.extrapolation);
     let own_frame = || loaded[datum].frame_id.clone();
-    let rate_hz = output.rate_hz.or_else(|| fusion::fastest_rate_hz(sources)).unwrap_or(1.0);
-    Plan {
+    let rate_hz = rate_hz(config, sources, warnings)?;
+    Ok(Plan {
         origin,
         frame_id: output.frame_id.clone().unwrap_or_else(own_frame),
         rate_hz,
@@ -138,6 +149,49 @@ fn plan(config: &Config, loaded: &[Loaded], sources: &[Source], datum: usize, or
             .iter()
             .map(|p| Height { name: p.name.clone(), z_m: p.z_m })
             .collect(),
+    })
+}
+
+/// Most points of a track: 14 h at 100 Hz, 3 GB of messages.
+const MAX_POINTS: f64 = 5e6;
+
+/// Most points for each sample, where the rate is not the user's: samples in bursts have a short median
+/// interval that says nothing of the log.
+const MAX_POINTS_PER_SAMPLE: f64 = 100.0;
+
+/// Points a second, such that the track stays of a size that can be read.
+fn rate_hz(config: &Config, sources: &[Source], warnings: &mut Vec<String>) -> Result<f64, CommandError> {
+    let pieces = coverage::Coverage::of(sources).pieces(config.fusion.bridge_max_s);
+    let seen_s: f64 = pieces.iter().map(|p| p.1 - p.0).sum();
+    let span_s = seen_s + config.extrapolation.horizon_s;
+    if let Some(rate_hz) = config.output.rate_hz {
+        let points = rate_hz * span_s;
+        return if points <= MAX_POINTS {
+            Ok(rate_hz)
+        } else {
+            Err(CommandError::TooManyPoints { rate_hz, span_s, points, most: MAX_POINTS })
+        };
+    }
+    let rate_hz = fusion::fastest_rate_hz(sources).unwrap_or(1.0);
+    let samples: usize = sources.iter().map(Source::len).sum();
+    let for_samples = 1000.0 + MAX_POINTS_PER_SAMPLE * samples as f64;
+    let lowered = rate_hz.min(for_samples / seen_s).min(MAX_POINTS / span_s);
+    if lowered == rate_hz {
+        return Ok(rate_hz);
+    }
+    warnings.push(format!(
+        "the median interval of the fastest source asks for {rate_hz:.2} points a second over {span_s:.0} s: lowered \
+         to {lowered:.2}; set `output.rate_hz` for another rate"
+    ));
+    Ok(lowered)
+}
+
+/// An error where the track has a point that is no number, which happens with samples of absurd size.
+fn check_finite(fusion: &Fusion) -> Result<(), CommandError> {
+    let finite = |p: &&TrackPoint| p.state.position.iter().chain(&p.state.velocity).all(|v| v.is_finite());
+    match fusion.track.points.iter().find(|p| !finite(p)) {
+        Some(point) => Err(CommandError::NotFinite { time: point.time }),
+        None => Ok(()),
     }
 }
 
@@ -160,9 +214,11 @@ fn first_sample(datum: &Source, fusion: &Fusion, origin: Time) -> Time {
     origin.plus_seconds(if first.is_finite() { first } else { start })
 }
 
+/// Clocks that differ by more than this count from different epochs.
+const DIFFERENT_EPOCHS_S: f64 = 3600.0;
+
 /// Seconds between the datum's clock and the log's, where they are clocks of different epochs.
 fn log_time_shift_s(datum: &Loaded) -> Option<f64> {
-    const DIFFERENT_EPOCHS_S: f64 = 3600.0;
     Some(datum.timing.delay_s).filter(|d| d.abs() > DIFFERENT_EPOCHS_S)
 }
 
@@ -172,8 +228,20 @@ fn surface_at_zero(config: &Config, sources: &[Source]) -> bool {
     config.output.surface_at_zero.unwrap_or_else(|| heights().all(|z| z < 2.0) && heights().any(|z| z < -2.0))
 }
 
-fn warnings(loaded: &[Loaded], fusion: &Fusion, shift_s: Option<f64>) -> Vec<String> {
+fn warnings_of(loaded: &[Loaded], datum: usize, fusion: &Fusion, shift_s: Option<f64>) -> Vec<String> {
     let mut warnings: Vec<String> = loaded.iter().flat_map(|l| l.warnings.clone()).collect();
+    let of_datum = &loaded[datum];
+    for other in loaded {
+        let apart_s = other.timing.delay_s - of_datum.timing.delay_s;
+        if apart_s.abs() > DIFFERENT_EPOCHS_S {
+            warnings.push(format!(
+                "{}'s and {}'s clocks are of different epochs, {:.0} s apart: set `time = \"log\"` for both",
+                other.source.name,
+                of_datum.source.name,
+                apart_s.abs()
+            ));
+        }
+    }
     let frames: BTreeMap<&str, &str> = loaded
         .iter()
         .filter(|l| !l.frame_id.is_empty())

@@ -13,8 +13,10 @@ use crate::cli::Voice;
 use crate::config::ConfigError;
 use crate::estimate::EstimateError;
 use crate::log::LogError;
+use crate::printable::printable;
 use crate::simulate::SimulateError;
 use crate::source::SourceError;
+use crate::time::Time;
 
 /// How a command ended that did what it should.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,6 +45,35 @@ pub enum CommandError {
     /// The simulator.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
+    /// The track would have more points than anyone can read.
+    #[error(
+        "output.rate_hz is {rate_hz}, which makes {points:.0} points over {span_s:.0} s with the extrapolation, expected \
+         at most {most:.0}"
+    )]
+    TooManyPoints {
+        /// The rate that was asked for, Hz.
+        rate_hz: f64,
+        /// How long the track is, s.
+        span_s: f64,
+        /// How many points that makes.
+        points: f64,
+        /// How many there may be.
+        most: f64,
+    },
+    /// The track is no track.
+    #[error("the track is not finite at {time}: some samples are too large to compute with")]
+    NotFinite {
+        /// The first such point.
+        time: Time,
+    },
+    /// A scenario, with its file.
+    #[error("{path}: {error}")]
+    Scenario {
+        /// The file.
+        path: String,
+        /// What is wrong with it.
+        error: Box<SimulateError>,
+    },
     /// A file that is no log.
     #[error("{path}: {source}")]
     File {
@@ -61,6 +92,7 @@ impl CommandError {
             Self::Config(error) => error.hint(),
             Self::Log(error) => error.hint(),
             Self::Source(error) => error.hint(),
+            Self::TooManyPoints { .. } => Some("lower `output.rate_hz` or `extrapolation.horizon_s`".into()),
             _ => None,
         }
     }
@@ -69,11 +101,12 @@ impl CommandError {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         let usage = match self {
-            Self::Config(_) => true,
+            Self::Config(_) | Self::TooManyPoints { .. } | Self::File { .. } => true,
             Self::Source(SourceError::Log(error)) | Self::Log(error) => is_usage(error),
             Self::Source(error) => error.is_usage(),
-            Self::Simulate(error) => !matches!(error, SimulateError::Diverged { .. } | SimulateError::Log(_)),
-            Self::Estimate(_) | Self::File { .. } => false,
+            Self::Simulate(error) => is_of_scenario(error),
+            Self::Scenario { error, .. } => is_of_scenario(error),
+            Self::Estimate(_) | Self::NotFinite { .. } => false,
         };
         if usage { 2 } else { 1 }
     }
@@ -86,12 +119,27 @@ fn is_usage(error: &LogError) -> bool {
     )
 }
 
+fn is_of_scenario(error: &SimulateError) -> bool {
+    !matches!(error, SimulateError::Diverged { .. } | SimulateError::Log(_))
+}
+
 impl From<Outcome> for ExitCode {
     fn from(outcome: Outcome) -> Self {
         match outcome {
             Outcome::Done => Self::SUCCESS,
             Outcome::Warned => Self::from(3),
         }
+    }
+}
+
+/// Prints why a command wrote nothing, and what to do about it, on stderr.
+pub fn explain(error: &CommandError) {
+    let mut stderr = io::stderr().lock();
+    let text = error.to_string();
+    let lines: Vec<_> = text.lines().map(printable).collect();
+    let _ = writeln!(stderr, "error: {}", lines.join("\n"));
+    if let Some(hint) = error.hint() {
+        let _ = writeln!(stderr, "hint: {hint}");
     }
 }
 
@@ -109,7 +157,7 @@ fn say(voice: Voice, text: &str, json: &impl serde::Serialize, warnings: &[Strin
     if !voice.quiet && (voice.json || !stdout.is_terminal()) {
         let mut stderr = io::stderr().lock();
         for warning in warnings {
-            let _ = writeln!(stderr, "warning: {warning}");
+            let _ = writeln!(stderr, "warning: {}", printable(warning));
         }
     }
 }

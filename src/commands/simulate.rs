@@ -19,8 +19,10 @@ pub fn simulate(args: &Simulate) -> Result<Outcome, CommandError> {
         std::fs::read_to_string(path)
             .map_err(|source| CommandError::File { path: path.display().to_string(), source })
     };
-    let scenario = Scenario::from_toml(&read(&args.scenario)?)?;
-    let simulation = run(&scenario)?;
+    let of_file =
+        |error| CommandError::Scenario { path: args.scenario.display().to_string(), error: Box::new(error) };
+    let scenario = Scenario::from_toml(&read(&args.scenario)?).map_err(of_file)?;
+    let simulation = run(&scenario).map_err(of_file)?;
     let len = write_new(&args.output, args.force, |file| {
         write_simulation(&scenario, &simulation, file).map_err(CommandError::from)
     })?;

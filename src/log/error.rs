@@ -159,10 +159,10 @@ impl LogError {
                  private records"
             }
             Self::TopicTaken { .. } => {
-                "choose another name with `--prefix`, or take the old channels out with `trackfuse restore` first"
+                "choose another name with `--prefix`, or give the log that these channels were added to"
             }
             Self::OutputExists { .. } => "`--force` replaces it, `-o` names another",
-            Self::OutputIsInput { .. } => "`--in-place` adds to the log itself, `-o` names another output",
+            Self::OutputIsInput { .. } => "`-o` names another output",
             _ => return None,
         };
         Some(hint.to_owned())

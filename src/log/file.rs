@@ -47,8 +47,10 @@ impl LogFile {
     pub(super) fn open(path: &Path) -> Result<Self, LogError> {
         let cannot = |source| LogError::Open { path: path.to_owned(), source };
         // Asked before opening, which would wait on a named pipe.
-        if !fs::metadata(path).map_err(cannot)?.is_file() {
-            return Err(cannot(io::Error::other("not a regular file")));
+        let kind = fs::metadata(path).map_err(cannot)?;
+        if !kind.is_file() {
+            let found = if kind.is_dir() { "it is a directory" } else { "it is no regular file" };
+            return Err(cannot(io::Error::other(found)));
         }
         let file = File::open(path).map_err(cannot)?;
         let len = file.metadata().map_err(cannot)?.len();

@@ -105,7 +105,14 @@ fn temporary_beside(out: &Path) -> io::Result<NamedTempFile> {
     // As any new file, less the user's umask; temporary files are private otherwise.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(directory(out))
+    // Less the temporary's own name, which the user didn't choose.
+    builder.tempfile_in(directory(out)).map_err(|error| match error.kind() {
+        kind @ (io::ErrorKind::NotFound
+        | io::ErrorKind::PermissionDenied
+        | io::ErrorKind::ReadOnlyFilesystem
+        | io::ErrorKind::StorageFull) => kind.into(),
+        _ => error,
+    })
 }
 
 /// Refuses an output before any work is done for it.
@@ -119,11 +126,15 @@ pub(super) fn check_output(log: &Log, out: &Path, force: bool) -> Result<(), Log
 
 fn check_name(out: &Path, force: bool) -> Result<(), LogError> {
     let path = || out.to_owned();
+    let cannot = |why: String| Err(LogError::Write { path: path(), source: io::Error::other(why) });
+    if !directory(out).is_dir() {
+        return cannot(format!("there is no folder {}", directory(out).display()));
+    }
     match fs::symlink_metadata(out) {
+        Ok(found) if found.is_dir() => cannot("it is a directory".into()),
+        // A device or a pipe would be replaced, not written to.
+        Ok(found) if !found.is_file() && !found.is_symlink() => cannot("it is no regular file".into()),
         Ok(_) if !force => Err(LogError::OutputExists { path: path() }),
-        Ok(found) if found.is_dir() => {
-            Err(LogError::Write { path: path(), source: io::ErrorKind::IsADirectory.into() })
-        }
         _ => Ok(()),
     }
 }

@@ -3,6 +3,7 @@
 use std::fmt::{self, Write};
 
 use super::Report;
+use crate::printable::printable;
 
 /// The report as text. It doesn't name the files, which may change without the track changing.
 #[must_use]
@@ -66,7 +67,7 @@ fn write_page(out: &mut String, report: &Report) -> fmt::Result {
     if !report.warnings.is_empty() {
         writeln!(out)?;
         for warning in &report.warnings {
-            writeln!(out, "warning: {warning}")?;
+            writeln!(out, "warning: {}", printable(warning))?;
         }
     }
     Ok(())
@@ -79,7 +80,8 @@ fn sources(out: &mut String, report: &Report) -> fmt::Result {
         "source", "samples", "Hz", "from .. to s", "clock", "log - sample ms"
     )?;
     for source in &report.sources {
-        let name = if source.datum { format!("{} (datum)", source.name) } else { source.name.clone() };
+        let name = printable(&source.name);
+        let name = if source.datum { format!("{name} (datum)") } else { name.into_owned() };
         let span = source.span_s.map_or("-".into(), |(a, b)| format!("{a:.2} .. {b:.2}"));
         let delay = format!("{:.1} ± {:.1}", 1e3 * source.delay_s, 1e3 * source.delay_spread_s);
         let sigma = [
@@ -97,8 +99,8 @@ fn sources(out: &mut String, report: &Report) -> fmt::Result {
             source.clock,
             sigma.join(", ")
         )?;
-        let paths: Vec<&str> =
-            [&source.position, &source.velocity].into_iter().flatten().map(String::as_str).collect();
+        let paths: Vec<_> =
+            [&source.position, &source.velocity].into_iter().flatten().map(|p| printable(p)).collect();
         writeln!(out, "  {}", paths.join(", "))?;
     }
     if let Some(datum) = report.sources.iter().find(|s| s.datum) {
@@ -108,8 +110,12 @@ fn sources(out: &mut String, report: &Report) -> fmt::Result {
             datum.name
         )?;
     }
+    if report.sources.len() == 1 {
+        writeln!(out, "one source only: it is smoothed and carried on, and nothing checks it")?;
+    }
     if !report.unused_topics.is_empty() {
-        writeln!(out, "not used: {}", report.unused_topics.join(", "))?;
+        let topics: Vec<_> = report.unused_topics.iter().map(|t| printable(t)).collect();
+        writeln!(out, "not used: {}", topics.join(", "))?;
     }
     Ok(())
 }
@@ -124,7 +130,7 @@ fn phases(out: &mut String, report: &Report) -> fmt::Result {
         let name = if phase.sources.is_empty() {
             phase.phase.clone()
         } else {
-            format!("{}: {}", phase.phase, phase.sources.join(" + "))
+            format!("{}: {}", phase.phase, printable(&phase.sources.join(" + ")))
         };
         let span = format!("{:.2} .. {:.2}", phase.span_s.0, phase.span_s.1);
         let rmse = |v: Option<f64>, unit: &str| v.map_or("-".into(), |v| format!("{v:.3} {unit}"));
@@ -155,7 +161,9 @@ fn events(out: &mut String, report: &Report) -> fmt::Result {
         writeln!(
             out,
             "{:<34} {time:>20} {:>12.2} {speed:>24}   {}",
-            event.name, event.position_m[2], event.phase
+            printable(&event.name),
+            event.position_m[2],
+            event.phase
         )?;
     }
     Ok(())

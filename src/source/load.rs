@@ -9,6 +9,7 @@ use crate::estimate::noise;
 use crate::log::Log;
 use crate::log::decode::MessagePath;
 use crate::math::robust;
+use crate::printable::printable;
 use crate::sample::{Quantity, Sample, Source};
 use crate::time::Time;
 
@@ -70,8 +71,8 @@ pub struct Loaded {
 const BACKWARD_S: f64 = 1.0;
 
 /// Readings of one source as they come.
-struct Gathered<'a> {
-    config: &'a SourceConfig,
+struct Gathered {
+    config: SourceConfig,
     paths: Vec<(Quantity, MessagePath)>,
     readings: [Vec<Reading>; 2],
     delays_s: Vec<f64>,
@@ -88,9 +89,16 @@ struct Gathered<'a> {
 /// Loads `configs` in one pass over the log; the origin of the samples' seconds is the median time of the
 /// [`datum`]'s.
 ///
+/// What gives nothing at all is an error where the user `named` the sources, and else left out while
+/// something remains: the third part of the answer has a sentence on each.
+///
 /// # Errors
 /// [`SourceError`] for a path or topic that doesn't fit, and for a source without a single sample.
-pub fn load(log: &Log, configs: &[SourceConfig]) -> Result<(Vec<Loaded>, Time), SourceError> {
+pub fn load(
+    log: &Log,
+    configs: &[SourceConfig],
+    named: bool,
+) -> Result<(Vec<Loaded>, Time, Vec<String>), SourceError> {
     let mut gathered = configs.iter().map(Gathered::new).collect::<Result<Vec<_>, _>>()?;
     let index = log.index();
     let mut readers: BTreeMap<u16, Vec<(usize, Reader)>> = BTreeMap::new();
@@ -112,7 +120,7 @@ pub fn load(log: &Log, configs: &[SourceConfig]) -> Result<(Vec<Loaded>, Time), 
                 });
             }
             for channel in channels {
-                let reader = Reader::new(source.config, &source.paths, index, channel)?;
+                let reader = Reader::new(&source.config, &source.paths, index, channel)?;
                 readers.entry(channel.id).or_default().push((i, reader));
             }
         }
@@ -129,15 +137,27 @@ pub fn load(log: &Log, configs: &[SourceConfig]) -> Result<(Vec<Loaded>, Time), 
         }
         Ok::<(), SourceError>(())
     })?;
+    let (mut dropped, mut first_error) = (Vec::new(), None);
     for source in &mut gathered {
-        source.check()?;
+        while let Some((quantity, error)) = source.lack() {
+            if named {
+                return Err(error);
+            }
+            dropped.push(format!("{} is left out: {error}", source.drop(quantity)));
+            first_error.get_or_insert(error);
+        }
     }
-    let origin = gathered.get(datum(configs)).map_or(Time::from_ns(0), Gathered::median_time);
-    Ok((gathered.into_iter().map(|g| g.finish(origin)).collect(), origin))
+    gathered.retain(|source| !source.paths.is_empty());
+    if let (true, Some(error)) = (gathered.is_empty(), first_error) {
+        return Err(error);
+    }
+    let kept: Vec<SourceConfig> = gathered.iter().map(|g| g.config.clone()).collect();
+    let origin = gathered.get(datum(&kept)).map_or(Time::from_ns(0), Gathered::median_time);
+    Ok((gathered.into_iter().map(|g| g.finish(origin)).collect(), origin, dropped))
 }
 
-impl<'a> Gathered<'a> {
-    fn new(config: &'a SourceConfig) -> Result<Self, SourceError> {
+impl Gathered {
+    fn new(config: &SourceConfig) -> Result<Self, SourceError> {
         let given = [(Quantity::Position, &config.position), (Quantity::Velocity, &config.velocity)];
         let parse = |(quantity, text): (Quantity, &Option<String>)| {
             let text = text.as_ref()?;
@@ -148,7 +168,7 @@ impl<'a> Gathered<'a> {
             )
         };
         Ok(Self {
-            config,
+            config: config.clone(),
             paths: given.into_iter().filter_map(parse).collect::<Result<_, _>>()?,
             readings: [Vec::new(), Vec::new()],
             delays_s: Vec::new(),
@@ -193,33 +213,67 @@ impl<'a> Gathered<'a> {
         }
     }
 
-    /// An error where a path gave nothing at all.
-    fn check(&mut self) -> Result<(), SourceError> {
+    /// What stands against using it, and the quantity at fault where it is one: a path that gave nothing at
+    /// all, or samples that are all of one instant.
+    fn lack(&mut self) -> Option<(Option<Quantity>, SourceError)> {
         let name = self.config.name.clone();
         if let Some((count, _)) = self.undecodable
             && count == self.messages
             && let Some((_, error)) = self.undecodable.take()
         {
             let topic = self.paths.first().map_or(String::new(), |(_, p)| p.topic.clone());
-            return Err(SourceError::Decode { name, topic, error });
+            return Some((None, SourceError::Decode { name, topic, error }));
+        }
+        if self.untimed > 0 && self.clocks == [0; 3] {
+            let (choice, count) = (self.config.time, self.untimed);
+            return Some((None, SourceError::NoTime { name, choice, count }));
         }
         for (quantity, path) in &self.paths {
             let q = *quantity as usize;
             if !self.readings[q].is_empty() {
                 continue;
             }
-            let found = match self.first_fault[q].take() {
-                Some(Fault::Miss(miss)) => return Err(SourceError::Miss { name, miss }),
-                Some(Fault::NoVector(kind)) => kind.to_owned(),
-                Some(fault) => fault.description().unwrap_or_default().to_owned(),
+            let (found, fits) = match self.first_fault[q].take() {
+                Some(Fault::Miss(miss)) => return Some((Some(*quantity), SourceError::Miss { name, miss })),
+                Some(Fault::NoOrientation) => {
+                    let path = path.to_string();
+                    return Some((Some(*quantity), SourceError::NoOrientation { name, path }));
+                }
+                Some(Fault::NoVector { kind, fits }) => (kind, fits),
+                Some(fault) => (fault.description().unwrap_or_default(), Vec::new()),
                 None => {
-                    let topics = vec![path.topic.clone()];
-                    return Err(SourceError::Empty { name, topics });
+                    let topic = path.topic.clone();
+                    return Some((Some(*quantity), SourceError::Empty { name, topic }));
                 }
             };
-            return Err(SourceError::NoVector { name, path: path.to_string(), found, count: self.messages });
+            let spare = self.paths.len() > 1 && *quantity == Quantity::Velocity;
+            let (path, count) = (path.to_string(), self.messages);
+            let error = SourceError::NoVector { name, path, found, fits, spare, count };
+            return Some((Some(*quantity), error));
         }
-        Ok(())
+        let times = || self.readings.iter().flatten().map(|r| r.time);
+        match (times().min(), times().max(), times().count()) {
+            (Some(time), Some(last), count) if count > 2 && time == last => {
+                Some((None, SourceError::OneInstant { name, time, count }))
+            }
+            _ => None,
+        }
+    }
+
+    /// Leaves out one of the quantities, or all of the source, and says which.
+    fn drop(&mut self, quantity: Option<Quantity>) -> &'static str {
+        match quantity {
+            Some(Quantity::Velocity) if self.paths.len() > 1 => {
+                self.config.velocity = None;
+                self.paths.retain(|(q, _)| *q != Quantity::Velocity);
+                "a velocity"
+            }
+            _ => {
+                self.paths.clear();
+                self.readings = [Vec::new(), Vec::new()];
+                "a source"
+            }
+        }
     }
 
     fn median_time(&self) -> Time {
@@ -260,7 +314,7 @@ impl<'a> Gathered<'a> {
     }
 
     fn warnings(&self) -> Vec<String> {
-        let name = &self.config.name;
+        let name = printable(&self.config.name);
         let mut warnings = Vec::new();
         if let Some((count, error)) = &self.undecodable {
             warnings.push(format!("{name}: {count} of {} messages can't be decoded: {error}", self.messages));
@@ -294,7 +348,7 @@ impl Fault {
     fn description(&self) -> Option<&'static str> {
         match self {
             Self::Miss(_) => Some("the path leads nowhere in them"),
-            Self::NoVector(_) => Some("no vector at the path"),
+            Self::NoVector { .. } => Some("no vector at the path"),
             Self::NotFinite => Some("NaN or infinite"),
             Self::NoOrientation => Some("no orientation of unit length to turn the velocity by"),
             Self::Filtered => None,

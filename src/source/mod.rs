@@ -8,10 +8,13 @@ mod reading;
 mod recognise;
 
 pub use load::{Loaded, SigmaOrigin, Timing, datum, load};
-pub use recognise::{Candidate, Recognised, is_datum_like, recognise};
+pub use recognise::{Candidate, Choice, Recognised, is_datum_like, recognise};
 
+use crate::config::TimeChoice;
 use crate::log::LogError;
 use crate::log::decode::{DecodeError, PathError, PathMiss};
+use crate::printable::printable;
+use crate::time::Time;
 
 /// Why there are no samples.
 #[derive(Debug, thiserror::Error)]
@@ -20,18 +23,39 @@ pub enum SourceError {
     #[error(transparent)]
     Log(#[from] LogError),
     /// No topic's name says that it is a sensor.
-    #[error("no channel is recognised as a source{}", listed("; these would fit", candidates))]
+    #[error(
+        "no channel is recognised as a source{}{}", listed("; these would fit: ", candidates),
+        if candidates.is_empty() { listed_unusable(unusable) } else { String::new() }
+    )]
     Unrecognised {
         /// Channels that could be sources.
         candidates: Vec<Candidate>,
+        /// All other topics, and why they can't be.
+        unusable: Vec<(String, String)>,
+        /// The candidates as a config would name them.
+        choices: Vec<Choice>,
     },
     /// Several channels would do for one source, or several sources for the datum.
-    #[error("{what}{}", listed("; these would fit", candidates))]
+    #[error("{what}{}", listed("; these would fit: ", candidates))]
     Ambiguous {
         /// What can't be decided.
         what: String,
         /// Channels that could be meant.
         candidates: Vec<Candidate>,
+        /// All recognised sources as a config would name them.
+        choices: Vec<Choice>,
+    },
+    /// A velocity in the body frame, with nothing to turn it by.
+    #[error(
+        "source {name:?}: {} is in the body frame, but its messages hold no orientation (a unit quaternion) beside a \
+         position to turn it by",
+        printable(path)
+    )]
+    NoOrientation {
+        /// The source.
+        name: String,
+        /// The velocity's path.
+        path: String,
     },
     /// A path's text is wrong.
     #[error("source {name:?}: {error}")]
@@ -42,7 +66,7 @@ pub enum SourceError {
         error: PathError,
     },
     /// The log has no such topic.
-    #[error("source {name:?}: topic {topic:?} is not in the log; it has: {}", topics.join(", "))]
+    #[error("source {name:?}: topic {topic:?} is not in the log; it has: {}", some_of(topics))]
     NoTopic {
         /// The source.
         name: String,
@@ -62,7 +86,7 @@ pub enum SourceError {
         error: DecodeError,
     },
     /// A path doesn't fit the channel's messages.
-    #[error("source {name:?}: {miss}")]
+    #[error("source {name:?}: {}", printable(&miss.to_string()))]
     Miss {
         /// The source.
         name: String,
@@ -71,8 +95,9 @@ pub enum SourceError {
     },
     /// A path leads to something that is no vector.
     #[error(
-        "source {name:?}: {path} is {found} in all {count} messages, expected an object with x, y, z or an array \
-         of three finite numbers"
+        "source {name:?}: {} is {found} in all {count} messages, expected an object with x, y, z or an array of \
+         three finite numbers",
+        printable(path)
     )]
     NoVector {
         /// The source.
@@ -80,17 +105,41 @@ pub enum SourceError {
         /// The path.
         path: String,
         /// What is there in the first message.
-        found: String,
+        found: &'static str,
+        /// Paths from there on that lead to a vector.
+        fits: Vec<String>,
+        /// Whether it is a velocity, which the source can do without.
+        spare: bool,
         /// Number of messages.
         count: usize,
     },
+    /// No message has a time.
+    #[error("source {name:?}: none of {count} messages has a usable time{}", asked_for(*choice))]
+    NoTime {
+        /// The source.
+        name: String,
+        /// The clock that the config asks for.
+        choice: Option<TimeChoice>,
+        /// Number of messages.
+        count: usize,
+    },
+    /// All samples have the same time.
+    #[error("source {name:?}: all {count} samples are of one instant, {time}, expected a time each")]
+    OneInstant {
+        /// The source.
+        name: String,
+        /// That instant.
+        time: Time,
+        /// Number of samples.
+        count: usize,
+    },
     /// Nothing was measured.
-    #[error("source {name:?}: the topics {} have no messages", topics.join(", "))]
+    #[error("source {name:?}: topic {topic:?} has no messages that its path lets through")]
     Empty {
         /// The source.
         name: String,
-        /// The topics.
-        topics: Vec<String>,
+        /// The topic.
+        topic: String,
     },
 }
 
@@ -98,34 +147,46 @@ impl SourceError {
     /// What to do about it.
     #[must_use]
     pub fn hint(&self) -> Option<String> {
-        let table = |candidates: &[Candidate]| {
-            let tables: Vec<String> = candidates
-                .iter()
-                .take(4)
-                .map(|c| {
-                    let paths = [("position", &c.position), ("velocity", &c.velocity)];
-                    let keys = paths.iter().filter_map(|(k, p)| Some(format!("\n{k} = {:?}", p.as_deref()?)));
-                    format!("[[source]]\nname = {:?}{}", c.name(), keys.collect::<String>())
-                })
-                .collect();
-            format!(
-                "name the sources, and one of them with `datum = true`, in a config and pass it with `--config`:\n\n{}\n",
-                tables.join("\n\n")
-            )
-        };
-        match self {
-            Self::Log(error) => error.hint(),
-            Self::Unrecognised { candidates } | Self::Ambiguous { candidates, .. } => {
-                (!candidates.is_empty()).then(|| table(candidates))
+        let hint = match self {
+            Self::Log(error) => return error.hint(),
+            Self::Unrecognised { choices, .. } | Self::Ambiguous { choices, .. } if !choices.is_empty() => {
+                format!(
+                    "choose the sources in a config, and pass it with `--config`; of these, keep what sees the vehicle, \
+                 and `datum` where it is trusted most:\n\n{}",
+                    recognise::config_of(choices)
+                )
             }
-            _ => None,
-        }
+            Self::NoTopic { topic, topics, .. } => {
+                let near = topics.iter().map(|t| (strsim::jaro_winkler(topic, t), t));
+                let (score, nearest) = near.max_by(|a, b| a.0.total_cmp(&b.0))?;
+                (score > 0.8).then(|| format!("did you mean {nearest:?}?"))?
+            }
+            Self::NoOrientation { .. } => {
+                "`velocity_frame = \"world\"` in this source says that nothing need be turned".into()
+            }
+            Self::NoVector { fits, .. } if !fits.is_empty() => {
+                let fits: Vec<_> = fits.iter().map(|path| format!("`{}`", printable(path))).collect();
+                format!("a vector stands at {}", fits.join(", "))
+            }
+            Self::NoVector { spare: true, .. } => {
+                "leave `velocity` out of this source's table in the config to do without it".into()
+            }
+            Self::NoTime { .. } | Self::OneInstant { .. } => {
+                "`time = \"publish\"` or `time = \"log\"` in this source takes another clock".into()
+            }
+            _ => return None,
+        };
+        Some(hint)
     }
 
     /// Whether the user's words, not the log's bytes, are at fault.
     #[must_use]
     pub fn is_usage(&self) -> bool {
-        !matches!(self, Self::Log(_) | Self::NoVector { .. } | Self::Empty { .. })
+        match self {
+            Self::NoVector { fits, .. } => !fits.is_empty(),
+            Self::Log(_) | Self::Empty { .. } | Self::NoTime { .. } | Self::OneInstant { .. } => false,
+            _ => true,
+        }
     }
 }
 
@@ -134,5 +195,37 @@ fn listed(what: &str, candidates: &[Candidate]) -> String {
         return String::new();
     }
     let list: Vec<String> = candidates.iter().map(Candidate::to_string).collect();
-    format!("{what}: {}", list.join(", "))
+    format!("{what}{}", list.join(", "))
+}
+
+fn listed_unusable(unusable: &[(String, String)]) -> String {
+    const SHOWN: usize = 12;
+    if unusable.is_empty() {
+        return ": the log has no channels".into();
+    }
+    let mut lines: Vec<String> =
+        unusable.iter().take(SHOWN).map(|(topic, why)| format!("{topic:?}: {}", printable(why))).collect();
+    if unusable.len() > SHOWN {
+        lines.push(format!("and {} more", unusable.len() - SHOWN));
+    }
+    format!("; no channel would fit:\n  {}", lines.join("\n  "))
+}
+
+/// The first topics of many.
+fn some_of(topics: &[String]) -> String {
+    const SHOWN: usize = 40;
+    let mut shown: Vec<String> = topics.iter().take(SHOWN).map(|t| printable(t).into_owned()).collect();
+    if topics.len() > SHOWN {
+        shown.push(format!("and {} more", topics.len() - SHOWN));
+    }
+    shown.join(", ")
+}
+
+fn asked_for(choice: Option<TimeChoice>) -> &'static str {
+    match choice {
+        Some(TimeChoice::Stamp) => ", as `time = \"stamp\"` asks for",
+        Some(TimeChoice::Publish) => ", as `time = \"publish\"` asks for",
+        Some(TimeChoice::Log) => ", as `time = \"log\"` asks for",
+        None => "",
+    }
 }

@@ -40,7 +40,12 @@ pub(super) enum Fault {
     /// The path leads nowhere in this message.
     Miss(PathMiss),
     /// It leads to something that is no vector.
-    NoVector(&'static str),
+    NoVector {
+        /// What stands there.
+        kind: &'static str,
+        /// Paths from there on that lead to a vector.
+        fits: Vec<String>,
+    },
     /// It leads to NaN or infinity.
     NotFinite,
     /// A filter in the path turned the message down; nothing is wrong with it.
@@ -109,12 +114,8 @@ impl Reader {
                 .and_then(|(_, position)| sibling(position, 1, "orientation"))
                 .filter(known);
             if body && *quantity == Quantity::Velocity && orientation.is_none() {
-                let what = format!(
-                    "source {:?}: {path} is in the body frame, but there is no orientation beside a position in \
-                     its messages to turn it by",
-                    config.name
-                );
-                return Err(SourceError::Ambiguous { what, candidates: Vec::new() });
+                let (name, path) = (config.name.clone(), path.to_string());
+                return Err(SourceError::NoOrientation { name, path });
             }
             let covariances = covariances(path).into_iter().filter(known).collect();
             vectors.push(Vector { quantity: *quantity, path: path.clone(), covariances, orientation });
@@ -173,7 +174,7 @@ impl Reader {
 
     fn vector(&self, vector: &Vector, message: &Value, time: Time) -> Result<Reading, Fault> {
         let at = vector.path.resolve(message).map_err(Fault::Miss)?.ok_or(Fault::Filtered)?;
-        let mut value = at.as_vector3().ok_or(Fault::NoVector(at.kind()))?;
+        let mut value = at.as_vector3().ok_or_else(|| no_vector(&vector.path, at))?;
         let mut sigma = vector
             .covariances
             .iter()
@@ -198,6 +199,13 @@ impl Reader {
             Err(Fault::NotFinite)
         }
     }
+}
+
+fn no_vector(path: &MessagePath, found: &Value) -> Fault {
+    let fields = if let Value::Object(fields) = found { fields.as_slice() } else { &[] };
+    let vectors = fields.iter().filter(|(_, value)| value.as_vector3().is_some());
+    let deeper = vectors.filter_map(|(name, _)| sibling(path, 0, name));
+    Fault::NoVector { kind: found.kind(), fits: deeper.map(|p| p.to_string()).collect() }
 }
 
 /// Where a message may keep the covariance of the vector at `path`: `pose.covariance` for

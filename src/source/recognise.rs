@@ -8,6 +8,7 @@ use super::SourceError;
 use crate::config::SourceConfig;
 use crate::log::Log;
 use crate::log::decode::{Decoder, Value};
+use crate::printable::{printable, toml_string};
 
 /// Words of class I sensors, the default datum, then those of class II. The second number of each is
 /// whether the word must stand alone, since it is part of other words.
@@ -17,6 +18,9 @@ const OTHER_WORDS: [(&str, bool); 4] =
 
 /// Topics with one of these words hold what a track is judged by, never what it is made of.
 const REFERENCE_WORDS: [&str; 4] = ["truth", "reference", "ins", "gt"];
+
+/// Schemas of an earlier run's results.
+const OWN_SCHEMAS: [&str; 2] = ["trackfuse.TrackPoint", "trackfuse.CharacteristicPoint"];
 
 /// Where the usual messages keep a position, the most specific first.
 const POSITION_FIELDS: [&str; 5] = ["pose.pose.position", "pose.position", "position", "point", "vector"];
@@ -35,14 +39,6 @@ pub struct Candidate {
     pub velocity: Option<String>,
 }
 
-impl Candidate {
-    /// A name for it: the topic's first part.
-    #[must_use]
-    pub fn name(&self) -> &str {
-        self.topic.trim_start_matches('/').split('/').next().unwrap_or(&self.topic)
-    }
-}
-
 impl fmt::Display for Candidate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let what = match (&self.position, &self.velocity) {
@@ -50,7 +46,7 @@ impl fmt::Display for Candidate {
             (Some(_), None) => "position",
             _ => "velocity",
         };
-        write!(f, "{} ({what})", self.topic)
+        write!(f, "{} ({what})", printable(&self.topic))
     }
 }
 
@@ -61,65 +57,118 @@ pub struct Recognised {
     pub sources: Vec<SourceConfig>,
     /// Channels that would fit, but whose names don't say that they are a sensor.
     pub unused: Vec<Candidate>,
+    /// Sensors that can't be read, a sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// A source as a hint proposes it: of several paths the first, the others as comments.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Choice {
+    /// What to call it.
+    pub name: String,
+    /// Paths of its position.
+    pub positions: Vec<String>,
+    /// Paths of its velocity.
+    pub velocities: Vec<String>,
+}
+
+/// The text of a config with these sources; the first that looks like a datum is it, else the first.
+pub(super) fn config_of(choices: &[Choice]) -> String {
+    let datum = choices.iter().position(|c| is_datum_like(&c.name)).unwrap_or(0);
+    let tables = choices.iter().enumerate().map(|(i, choice)| {
+        let mut lines = vec!["[[source]]".to_owned(), format!("name = {}", toml_string(&choice.name))];
+        for (key, paths) in [("position", &choice.positions), ("velocity", &choice.velocities)] {
+            let or = |j: usize| if j == 0 { "" } else { "# " };
+            let keys = paths.iter().enumerate();
+            lines.extend(keys.map(|(j, path)| format!("{}{key} = {}", or(j), toml_string(path))));
+        }
+        if i == datum && choices.len() > 1 {
+            lines.push("datum = true".to_owned());
+        }
+        lines.join("\n") + "\n"
+    });
+    tables.collect::<Vec<_>>().join("\n")
+}
+
+/// The candidates as a config would name them: each by its topic's first part, and a number where that is taken.
+fn choices_of(candidates: &[Candidate]) -> Vec<Choice> {
+    let mut choices: Vec<Choice> = Vec::new();
+    for candidate in candidates.iter().take(4) {
+        let first = candidate.topic.split('/').find(|part| !part.is_empty()).unwrap_or("source");
+        let numbered = (2..).map(|n| format!("{first}-{n}"));
+        let mut names = std::iter::once(first.to_owned()).chain(numbered);
+        let name = names.find(|name| choices.iter().all(|c| c.name != *name)).unwrap_or_default();
+        let (positions, velocities) =
+            (candidate.position.iter().cloned().collect(), candidate.velocity.iter().cloned().collect());
+        choices.push(Choice { name, positions, velocities });
+    }
+    choices
 }
 
 /// Recognises the sources of a log.
 ///
-/// Channels whose topics begin with `prefix` (an earlier track's) are passed over.
+/// Channels whose topics begin with `prefix`, and those that this program wrote, are passed over.
 ///
 /// # Errors
 /// [`SourceError::Unrecognised`] where no topic holds a sensor's word, [`SourceError::Ambiguous`] where
 /// several channels offer the same for one sensor, or several sensors could be the datum.
 pub fn recognise(log: &Log, prefix: &str) -> Result<Recognised, SourceError> {
-    let all = candidates(log, prefix)?;
+    let (all, unusable) = candidates(log, prefix)?;
     let (sensors, unused): (Vec<_>, Vec<_>) = all.into_iter().partition(|c| sensor_word(&c.topic).is_some());
-    let mut groups: BTreeMap<(String, String), Vec<Candidate>> = BTreeMap::new();
-    for candidate in sensors {
-        if let Some((before, name)) = sensor_word(&candidate.topic) {
-            groups.entry((before, name)).or_default().push(candidate);
-        }
+    let mut groups: BTreeMap<(String, String), Vec<&Candidate>> = BTreeMap::new();
+    for candidate in &sensors {
+        groups.entry(sensor_word(&candidate.topic).unwrap_or_default()).or_default().push(candidate);
     }
     if groups.is_empty() {
-        return Err(SourceError::Unrecognised { candidates: unused });
+        return Err(SourceError::Unrecognised { choices: choices_of(&unused), candidates: unused, unusable });
     }
-    let mut sources = Vec::new();
-    for ((before, name), members) in groups {
-        let unique = sources.iter().all(|s: &SourceConfig| s.name != name);
-        let name = if unique { name } else { format!("{before}{name}") };
-        let only = |path: fn(&Candidate) -> &Option<String>, what: &str| {
-            let mut found = members.iter().filter_map(|c| path(c).clone());
-            match (found.next(), found.next()) {
-                (path, None) => Ok(path),
-                _ => Err(SourceError::Ambiguous {
-                    what: format!("several channels hold a {what} of {name}"),
-                    candidates: members.clone(),
-                }),
-            }
-        };
-        let position = only(|c| &c.position, "position")?;
-        let velocity = only(|c| &c.velocity, "velocity")?;
-        sources.push(SourceConfig { name: name.clone(), position, velocity, ..SourceConfig::default() });
+    let mut choices: Vec<Choice> = Vec::new();
+    for ((before, word), members) in &groups {
+        let unique = choices.iter().all(|c| c.name != *word);
+        choices.push(Choice {
+            name: if unique { word.clone() } else { format!("{before}{word}") },
+            positions: members.iter().filter_map(|c| c.position.clone()).collect(),
+            velocities: members.iter().filter_map(|c| c.velocity.clone()).collect(),
+        });
     }
-    let datums: Vec<usize> = (0..sources.len()).filter(|&i| is_datum_like(&sources[i].name)).collect();
-    match (datums.as_slice(), sources.len()) {
-        (&[datum], _) => sources[..=datum].rotate_right(1),
-        (_, 1) => {}
-        _ => {
-            let candidates = sources
-                .iter()
-                .map(|s| Candidate {
-                    topic: s.name.clone(),
-                    position: s.position.clone(),
-                    velocity: s.velocity.clone(),
-                })
-                .collect();
-            let what =
-                "it is not clear which source is the datum, whose bias and clock are zero by definition";
-            return Err(SourceError::Ambiguous { what: what.into(), candidates });
+    let ambiguous =
+        |what: String| SourceError::Ambiguous { what, candidates: sensors.clone(), choices: choices.clone() };
+    for choice in &choices {
+        let several = [("position", choice.positions.len()), ("velocity", choice.velocities.len())];
+        if let Some((what, _)) = several.iter().find(|(_, count)| *count > 1) {
+            return Err(ambiguous(format!("several channels hold a {what} of {}", printable(&choice.name))));
         }
     }
+    let datums: Vec<usize> = (0..choices.len()).filter(|&i| is_datum_like(&choices[i].name)).collect();
+    let datum = match (datums.as_slice(), choices.len()) {
+        (&[datum], _) => datum,
+        (_, 1) => 0,
+        _ => {
+            let what =
+                "it is not clear which source is the datum, whose bias and clock are zero by definition";
+            return Err(ambiguous(what.into()));
+        }
+    };
+    let mut sources: Vec<SourceConfig> = choices
+        .iter()
+        .map(|c| SourceConfig {
+            name: c.name.clone(),
+            position: c.positions.first().cloned(),
+            velocity: c.velocities.first().cloned(),
+            ..SourceConfig::default()
+        })
+        .collect();
+    sources[..=datum].rotate_right(1);
     sources[0].datum = true;
-    Ok(Recognised { sources, unused })
+    let unread = |(topic, _): &&(String, String)| {
+        sensor_word(topic).is_some_and(|word| !groups.contains_key(&word) && !is_reference(topic))
+    };
+    let warnings = unusable
+        .iter()
+        .filter(unread)
+        .map(|(topic, why)| format!("{} looks like a sensor's and is not used: {why}", printable(topic)))
+        .collect();
+    Ok(Recognised { sources, unused, warnings })
 }
 
 /// Whether a name holds a word of the sensors that are the datum by default: tether, wire, gauge.
@@ -128,36 +177,78 @@ pub fn is_datum_like(name: &str) -> bool {
     find_word(name, &DATUM_WORDS).is_some()
 }
 
-/// Channels whose first message holds a position or a velocity.
-fn candidates(log: &Log, prefix: &str) -> Result<Vec<Candidate>, SourceError> {
+/// Topics, and why their channels can't be sources.
+type Unusable = Vec<(String, String)>;
+
+/// Channels whose first message holds a position or a velocity, and the others.
+fn candidates(log: &Log, prefix: &str) -> Result<(Vec<Candidate>, Unusable), SourceError> {
     let index = log.index();
-    let decoders: BTreeMap<u16, Decoder> = index
-        .channels
-        .values()
-        .filter(|c| !c.topic.starts_with(&format!("{prefix}/")))
-        .filter(|c| !words(&c.topic).iter().any(|w| REFERENCE_WORDS.contains(&w.as_str())))
-        .filter_map(|c| {
-            let schema = index.schema_of(c);
-            let (encoding, name, data) = schema
-                .map_or(("", "", &[][..]), |s| (s.encoding.as_str(), s.name.as_str(), s.data.as_slice()));
-            Some((c.id, Decoder::new(&c.message_encoding, encoding, name, data).ok()?))
-        })
-        .collect();
+    let (mut decoders, mut unusable) = (BTreeMap::new(), BTreeMap::new());
+    for channel in index.channels.values() {
+        let schema = index.schema_of(channel);
+        let (encoding, name, data) =
+            schema.map_or(("", "", &[][..]), |s| (s.encoding.as_str(), s.name.as_str(), s.data.as_slice()));
+        let topic = channel.topic.as_str();
+        if topic.starts_with(&format!("{prefix}/")) || OWN_SCHEMAS.contains(&name) {
+            unusable.insert(topic, "written by trackfuse".to_owned());
+        } else if is_reference(topic) {
+            unusable.insert(topic, "by its name a reference, which a track is judged by".to_owned());
+        } else {
+            match Decoder::new(&channel.message_encoding, encoding, name, data) {
+                Ok(decoder) => drop(decoders.insert(channel.id, decoder)),
+                Err(error) => drop(unusable.insert(topic, error.to_string())),
+            }
+        }
+    }
     let first = log.first_messages(&decoders.keys().copied().collect::<BTreeSet<_>>())?;
     let mut found: BTreeMap<&str, Candidate> = BTreeMap::new();
-    for (id, message) in &first {
-        let Ok(value) = decoders[id].decode(&message.data) else { continue };
+    for (id, decoder) in &decoders {
         let topic = index.channels[id].topic.as_str();
+        let Some(message) = first.get(id) else {
+            unusable.insert(topic, "no messages".to_owned());
+            continue;
+        };
+        let value = match decoder.decode(&message.data) {
+            Ok(value) => value,
+            Err(error) => {
+                unusable.insert(topic, error.to_string());
+                continue;
+            }
+        };
         let field = |fields: &[&str]| {
-            let fits = |f: &&&str| vector_at(&value, f) && (**f != "vector" || vector_is(topic, fields));
-            fields.iter().find(fits).map(|f| format!("{}.{f}", quoted(topic)))
+            let named = |f: &str| f != "vector" || vector_is(topic, fields);
+            let fits = |f: &&&str| vector_at(&value, f) && named(f);
+            // a sensor may begin before it has anything to say
+            let may_fit = |f: &&&str| sensor_word(topic).is_some() && absent_at(&value, f) && named(f);
+            let found = fields.iter().find(fits).or_else(|| fields.iter().find(may_fit));
+            found.map(|f| format!("{}.{f}", quoted(topic)))
         };
         let (position, velocity) = (field(&POSITION_FIELDS), field(&VELOCITY_FIELDS));
         if position.is_some() || velocity.is_some() {
             found.entry(topic).or_insert(Candidate { topic: topic.to_owned(), position, velocity });
+        } else {
+            let what = format!("no position or velocity in {}", fields_of(&value));
+            unusable.insert(topic, what);
         }
     }
-    Ok(found.into_values().collect())
+    unusable.retain(|topic, _| !found.contains_key(topic));
+    let unusable = unusable.into_iter().map(|(topic, why)| (topic.to_owned(), why)).collect();
+    Ok((found.into_values().collect(), unusable))
+}
+
+fn is_reference(topic: &str) -> bool {
+    words(topic).iter().any(|w| REFERENCE_WORDS.contains(&w.as_str()))
+}
+
+/// What a message is, with the names of its first fields.
+fn fields_of(value: &Value) -> String {
+    const SHOWN: usize = 8;
+    let Value::Object(fields) = value else { return value.kind().to_owned() };
+    let mut names: Vec<&str> = fields.iter().take(SHOWN).map(|(name, _)| &**name).collect();
+    if fields.len() > SHOWN {
+        names.push("...");
+    }
+    names.join(", ")
 }
 
 /// Whether a field that is just a `vector` is what `fields` look for: only the topic's name can say.
@@ -171,6 +262,14 @@ fn vector_is(topic: &str, fields: &[&str]) -> bool {
 fn vector_at(value: &Value, fields: &str) -> bool {
     let leaf = fields.split('.').try_fold(value, |v, name| v.field(name));
     leaf.and_then(Value::as_vector3).is_some()
+}
+
+/// Whether there is a place for a vector, but no value in it.
+fn absent_at(value: &Value, fields: &str) -> bool {
+    let leaf = fields.split('.').try_fold(value, |v, name| v.field(name));
+    let axis =
+        |v: &Value, name: &str| v.field(name).is_some_and(|c| *c == Value::Null || c.as_f64().is_some());
+    leaf.is_some_and(|v| *v == Value::Null || ["x", "y", "z"].iter().all(|name| axis(v, name)))
 }
 
 /// The topic as a path begins with it.
