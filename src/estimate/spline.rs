@@ -99,6 +99,9 @@ impl Default for Settings {
 /// Samples a knot, on average. 5: finer knots change nothing but the time, since the penalty smooths.
 const SAMPLES_PER_KNOT: f64 = 5.0;
 
+/// No finer by default, s: a vehicle's sharpest moves, a thrust's onset in 0.3 s, are followed at this spacing.
+const FINEST_SPACING_S: f64 = 0.08;
+
 /// Fewest sampling instants that a fit takes: a quadratic has three unknowns, its noise needs one more.
 pub const MIN_SAMPLES: usize = 4;
 
@@ -109,13 +112,13 @@ const PENALTY_ORDER: usize = 3;
 /// positive definite: data and penalty leave a direction open that the curve doesn't show.
 const RIDGE: f64 = 1e-13;
 
-/// The spacing that gives five samples a knot over `[from_s, to_s]`, all sources pooled.
+/// The spacing that gives five samples a knot over `[from_s, to_s]`, all sources pooled, but at least 0.08 s.
 ///
 /// The number of knots is so bounded by the number of samples, whatever the times are.
 #[must_use]
 pub fn default_knot_spacing_s(sources: &[Source], from_s: f64, to_s: f64) -> f64 {
     let samples: usize = sources.iter().map(Source::len).sum();
-    ((to_s - from_s) * SAMPLES_PER_KNOT / samples.max(1) as f64).max(1e-6)
+    ((to_s - from_s) * SAMPLES_PER_KNOT / samples.max(1) as f64).max(FINEST_SPACING_S)
 }
 
 /// One least-squares problem and its solution, for those axes whose weights agree.
@@ -211,26 +214,29 @@ pub fn fit(sources: &[Source], from_s: f64, to_s: f64, settings: &Settings) -> R
 fn check(sources: &[Source]) -> Result<(), EstimateError> {
     for source in sources {
         for quantity in Quantity::ALL {
-            for sample in source.series(quantity) {
-                let bad = |value, expected| EstimateError::BadNumber {
-                    what: format!("{} of {}", quantity.name(), source.name),
-                    time_s: sample.time_s,
-                    value,
-                    expected,
-                };
-                if let Some(&v) = sample.value.iter().find(|v| !v.is_finite()) {
-                    return Err(bad(v, "a finite number"));
-                }
-                if let Some(&v) = sample.sigma.iter().find(|v| !(**v > 0.0 && v.is_finite())) {
-                    return Err(bad(v, "a positive sigma"));
-                }
-                if !sample.time_s.is_finite() {
-                    return Err(bad(sample.time_s, "a finite time"));
-                }
+            let good = |s: &Sample| {
+                // a sum is finite only where all of its terms are
+                let sum: f64 = s.value.iter().chain(&s.sigma).sum::<f64>() + s.time_s;
+                sum.is_finite() && s.sigma.iter().all(|v| *v > 0.0)
+            };
+            if let Some(sample) = source.series(quantity).iter().find(|s| !good(s)) {
+                return Err(bad_number(source, quantity, sample));
             }
         }
     }
     Ok(())
+}
+
+/// What is wrong with a sample that [`check`] found.
+fn bad_number(source: &Source, quantity: Quantity, sample: &Sample) -> EstimateError {
+    let infinite = |v: &&f64| !v.is_finite();
+    let (value, expected) =
+        sample.value.iter().find(infinite).map(|&v| (v, "a finite number")).unwrap_or_else(|| {
+            let sigma = sample.sigma.iter().find(|v| !(**v > 0.0 && v.is_finite()));
+            sigma.map_or((sample.time_s, "a finite time"), |&v| (v, "a positive sigma"))
+        });
+    let what = format!("{} of {}", quantity.name(), source.name);
+    EstimateError::BadNumber { what, time_s: sample.time_s, value, expected }
 }
 
 /// The middle of the positions' range: coefficients about it are small, and so are rounding and ripple.
@@ -290,15 +296,13 @@ impl<const N: usize> Kernel for Assembly<'_, N> {
                 patch.first = active.first;
             }
             let [value, slope] = active.padded::<N>();
-            if let Some(p) = position {
-                let about_centre = std::array::from_fn(|a| p.value[a] - problem.centre[a]);
-                patch.add(value, about_centre, p.sigma[problem.weights_of].powi(-2), &mut normal.squares); // (7)
-                normal.rows += 1;
-            }
-            if let Some(v) = velocity {
-                patch.add(slope, v.value, v.sigma[problem.weights_of].powi(-2), &mut normal.squares); // (8)
-                normal.rows += 1;
-            }
+            let weight = |s: &Sample| s.sigma[problem.weights_of].powi(-2);
+            let (p, p_weight) = position.map_or(([0.0; 3], 0.0), |p| {
+                (std::array::from_fn(|a| p.value[a] - problem.centre[a]), weight(p))
+            });
+            let (v, v_weight) = velocity.map_or(([0.0; 3], 0.0), |v| (v.value, weight(v)));
+            patch.add([(value, p, p_weight), (slope, v, v_weight)], &mut normal.squares); // (7), (8)
+            normal.rows += usize::from(position.is_some()) + usize::from(velocity.is_some());
         }
         patch.flush(&mut normal);
         normal
@@ -317,21 +321,22 @@ impl<const N: usize> Patch<N> {
         Self { first: 0, gram: [[0.0; N]; N], right: [[0.0; 3]; N] }
     }
 
-    /// Adds the row `b c = value` of the given weight.
+    /// Adds the rows `b c = value` of the given weights, those of weight 0 in vain.
     #[inline(always)]
-    fn add(&mut self, b: &[f64; N], value: [f64; 3], weight: f64, squares: &mut [f64; 3]) {
+    fn add(&mut self, rows: [(&[f64; N], [f64; 3], f64); 2], squares: &mut [f64; 3]) {
+        let [(b, p, bw), (d, v, dw)] = rows;
         for i in 0..N {
-            let scaled = weight * b[i];
+            let (bi, di) = (bw * b[i], dw * d[i]);
             // the lower half too: a fixed length makes vector instructions
             for j in 0..N {
-                self.gram[i][j] += scaled * b[j];
+                self.gram[i][j] += bi * b[j] + di * d[j];
             }
             for axis in 0..3 {
-                self.right[i][axis] += scaled * value[axis];
+                self.right[i][axis] += bi * p[axis] + di * v[axis];
             }
         }
         for axis in 0..3 {
-            squares[axis] += weight * value[axis] * value[axis];
+            squares[axis] += bw * p[axis] * p[axis] + dw * v[axis] * v[axis];
         }
     }
 
@@ -471,11 +476,12 @@ impl Block {
         sum
     }
 
-    /// Its standard deviation by axis.
+    /// Its standard deviation by axis. Sigmas that turn out too small are scaled up, but none down: the user may
+    /// know of errors that the scatter doesn't show.
     #[inline(always)]
     fn sigma(&self, first: usize, row: &[f64]) -> [f64; 3] {
         let unit = self.inverse.quadratic_form(first, row).max(0.0);
-        self.noise_scale.map(|scale| (scale * unit).sqrt())
+        self.noise_scale.map(|scale| (scale.max(1.0) * unit).sqrt())
     }
 }
 
