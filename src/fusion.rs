@@ -16,9 +16,10 @@ use crate::estimate::moving_average::MovingAverage;
 use crate::estimate::polynomial;
 use crate::estimate::spline::{self, Coefficients};
 use crate::estimate::weighted_mean::WeightedMean;
+use crate::quality::{self, PhaseSummary};
 use crate::sample::{Quantity, Source};
 use crate::time::Time;
-use crate::track::{Curve, Method, Phase, State, Track, TrackPoint};
+use crate::track::{Curve, Method, Phase, Track, TrackPoint};
 
 /// What is to be done, every default resolved.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,24 +50,6 @@ pub struct Plan {
     pub stop_z_m: Option<f64>,
     /// Characteristic points to look for.
     pub heights: Vec<Height>,
-}
-
-/// One kind of stretch of the track, summed over the log.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PhaseSummary {
-    /// The phase.
-    pub phase: Phase,
-    /// The sources that see it: bit i is the i-th.
-    pub seen_by: u32,
-    /// First and last point, s since the origin.
-    pub span_s: (f64, f64),
-    /// Number of points of the track.
-    pub points: usize,
-    /// Root mean square distance of the samples from the track (Zhang 2025, eq. 12, over three axes), m and
-    /// m/s; `None` where nothing was measured.
-    pub rmse: [Option<f64>; 2],
-    /// Root mean square of the points' 3-D standard deviation, m and m/s.
-    pub sigma: [f64; 2],
 }
 
 /// What SFF chose.
@@ -156,20 +139,23 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
     let (mut plain, mut holdout) = (Vec::new(), None);
     if let Some((piece, settings)) = pieces.last().zip(plan.extrapolation) {
         let seconds = beyond(piece.to_s, points.last(), plan, settings.horizon_s);
+        // a source that stopped seeing earlier may disagree with those that see the end
+        let seen_by = coverage.seen_by(piece.to_s);
+        let last: Vec<Source> = piece
+            .sources
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| seen_by >> i & 1 == 1)
+            .map(|(_, s)| s.clone())
+            .collect();
         let plain_settings = extrapolation::Settings {
             order: PLAIN_PCF.0,
-            window_s: last_samples_s(&piece.sources, piece.to_s, PLAIN_PCF.1),
+            window_s: last_samples_s(&last, piece.to_s, PLAIN_PCF.1),
             prior: None,
             ..settings
         };
         let carry = |settings, stop_z_m: Option<f64>| -> Result<(Vec<TrackPoint>, Extrapolation), _> {
-            let made = extrapolation::extrapolate(
-                &piece.sources,
-                &*piece.curve,
-                piece.from_s,
-                piece.to_s,
-                &settings,
-            )?;
+            let made = extrapolation::extrapolate(&last, &*piece.curve, piece.from_s, piece.to_s, &settings)?;
             let carried = seconds
                 .iter()
                 .map_while(|&t| point(&made, t, Phase::Extrapolated, Method::Polynomial, 0))
@@ -190,6 +176,8 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
     }
 
     let track = Track { frame_id: plan.frame_id.clone(), points };
+    let fitted: Vec<(&[Source], &dyn Curve)> =
+        pieces.iter().map(|p| (p.sources.as_slice(), &*p.curve)).collect();
     let mut events = Vec::new();
     for height in &plan.heights {
         match characteristic_point::first_crossing(&track, height) {
@@ -201,7 +189,7 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
         }
     }
     Ok(Fusion {
-        phases: phases(&track, &pieces, &coverage, plan),
+        phases: quality::phases(&track, plan.origin, &fitted, &coverage),
         plain_pcf: Track { frame_id: plan.frame_id.clone(), points: plain },
         track,
         events,
@@ -221,13 +209,12 @@ fn fit_pieces(
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Piece>, EstimateError> {
     let (mut fitted, mut first_error) = (Vec::new(), None);
-    let (mut lost, mut lost_samples, mut lost_at) = (0, 0, None);
+    let (mut lost_samples, mut lost_at) = (0, None);
     for (from_s, to_s) in coverage.pieces(plan.bridge_max_s) {
         let inside: Vec<Source> = sources.iter().map(|s| s.within(from_s, to_s)).collect();
         match fit(&inside, from_s, to_s, plan) {
             Ok((curve, spline)) => fitted.push(Piece { from_s, to_s, sources: inside, curve, spline }),
             Err(error) => {
-                lost += 1;
                 lost_samples += inside.iter().map(Source::len).sum::<usize>();
                 lost_at.get_or_insert(plan.origin.plus_seconds(from_s));
                 first_error.get_or_insert(error);
@@ -244,8 +231,9 @@ fn fit_pieces(
     }
     if let Some(at) = lost_at {
         warnings.push(format!(
-            "{lost_samples} samples stand more than {} s away from all others, in {lost} stretches too short \
-             to fit, the first at {at}: left out (wrong stamps?)",
+            "left out: {lost_samples} {} more than {} s away from all others, too few to fit, the first at {at} \
+             (wrong stamps?)",
+            if lost_samples == 1 { "sample" } else { "samples" },
             plan.bridge_max_s
         ));
     }
@@ -368,64 +356,6 @@ fn warn_of_disagreement(
             }
         }
     }
-}
-
-/// Sums up the track and the samples' distances from it, phase by phase, in order of first appearance.
-fn phases(track: &Track, pieces: &[Piece], coverage: &Coverage, plan: &Plan) -> Vec<PhaseSummary> {
-    let mut summaries: Vec<PhaseSummary> = Vec::new();
-    let find = |summaries: &mut Vec<PhaseSummary>, phase, seen_by, t: f64| -> usize {
-        let known = summaries.iter().position(|s| s.phase == phase && s.seen_by == seen_by);
-        known.unwrap_or_else(|| {
-            let (span_s, points) = ((t, t), 0);
-            summaries.push(PhaseSummary { phase, seen_by, span_s, points, rmse: [None; 2], sigma: [0.0; 2] });
-            summaries.len() - 1
-        })
-    };
-    for point in &track.points {
-        let t = point.time.seconds_since(plan.origin);
-        let index = find(&mut summaries, point.phase, point.seen_by, t);
-        let summary = &mut summaries[index];
-        summary.span_s.1 = t;
-        summary.points += 1;
-        summary.sigma[0] += norm_squared(point.state.position_sigma);
-        summary.sigma[1] += norm_squared(point.state.velocity_sigma);
-    }
-    let mut sums = vec![[(0.0, 0_usize); 2]; summaries.len()];
-    for piece in pieces {
-        for sample in piece.sources.iter().flat_map(|s| Quantity::ALL.map(|q| (q, s.series(q)))) {
-            let (quantity, series) = sample;
-            for sample in series {
-                let seen_by = coverage.seen_by(sample.time_s);
-                let phase = Coverage::phase(seen_by);
-                let Some(index) = summaries.iter().position(|s| s.phase == phase && s.seen_by == seen_by)
-                else {
-                    continue;
-                };
-                if let Some(state) = piece.curve.at(sample.time_s) {
-                    let sum = &mut sums[index][quantity as usize];
-                    sum.0 += norm_squared(residual(sample.value, &state, quantity)); // (12)
-                    sum.1 += 1;
-                }
-            }
-        }
-    }
-    for (summary, sums) in summaries.iter_mut().zip(sums) {
-        summary.rmse = sums.map(|(sum, count)| (count > 0).then(|| (sum / count as f64).sqrt()));
-        summary.sigma = summary.sigma.map(|s| (s / summary.points.max(1) as f64).sqrt());
-    }
-    summaries
-}
-
-fn residual(value: [f64; 3], state: &State, quantity: Quantity) -> [f64; 3] {
-    let fitted = match quantity {
-        Quantity::Position => state.position,
-        Quantity::Velocity => state.velocity,
-    };
-    std::array::from_fn(|i| value[i] - fitted[i])
-}
-
-fn norm_squared(v: [f64; 3]) -> f64 {
-    v.iter().map(|x| x * x).sum()
 }
 
 /// The rate of the fastest source, Hz: what the track's defaults to.

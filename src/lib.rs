@@ -10,6 +10,7 @@ pub mod log;
 pub mod math;
 mod printable;
 pub mod publish;
+pub mod quality;
 pub mod report;
 pub mod sample;
 pub mod simulate;

@@ -2,6 +2,7 @@
 
 pub mod banded;
 pub mod chebyshev;
+mod elimination;
 pub mod gaussian_basis;
 pub mod least_squares;
 pub mod robust;

@@ -1,0 +1,88 @@
+//! How good a track is: how far the samples lie from it, phase by phase, and how sure it is of itself.
+
+use crate::estimate::coverage::Coverage;
+use crate::sample::{Quantity, Source};
+use crate::time::Time;
+use crate::track::{Curve, Phase, State, Track};
+
+/// One kind of stretch of the track, summed over the log.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhaseSummary {
+    /// The phase.
+    pub phase: Phase,
+    /// The sources that see it: bit i is the i-th.
+    pub seen_by: u32,
+    /// First and last point, s since the origin.
+    pub span_s: (f64, f64),
+    /// Number of points of the track.
+    pub points: usize,
+    /// Root mean square distance of the samples from the track (Zhang 2025, eq. 12, over three axes), m and
+    /// m/s; `None` where nothing was measured.
+    pub rmse: [Option<f64>; 2],
+    /// Root mean square of the points' 3-D standard deviation, m and m/s.
+    pub sigma: [f64; 2],
+}
+
+/// Sums up the track and the samples' distances from it, phase by phase, in order of first appearance.
+#[must_use]
+pub fn phases(
+    track: &Track,
+    origin: Time,
+    pieces: &[(&[Source], &dyn Curve)],
+    coverage: &Coverage,
+) -> Vec<PhaseSummary> {
+    let mut summaries: Vec<PhaseSummary> = Vec::new();
+    let find = |summaries: &mut Vec<PhaseSummary>, phase, seen_by, t: f64| -> usize {
+        let known = summaries.iter().position(|s| s.phase == phase && s.seen_by == seen_by);
+        known.unwrap_or_else(|| {
+            let (span_s, points) = ((t, t), 0);
+            summaries.push(PhaseSummary { phase, seen_by, span_s, points, rmse: [None; 2], sigma: [0.0; 2] });
+            summaries.len() - 1
+        })
+    };
+    for point in &track.points {
+        let t = point.time.seconds_since(origin);
+        let index = find(&mut summaries, point.phase, point.seen_by, t);
+        let summary = &mut summaries[index];
+        summary.span_s.1 = t;
+        summary.points += 1;
+        summary.sigma[0] += norm_squared(point.state.position_sigma);
+        summary.sigma[1] += norm_squared(point.state.velocity_sigma);
+    }
+    let mut sums = vec![[(0.0, 0_usize); 2]; summaries.len()];
+    for (sources, curve) in pieces {
+        for sample in sources.iter().flat_map(|s| Quantity::ALL.map(|q| (q, s.series(q)))) {
+            let (quantity, series) = sample;
+            for sample in series {
+                let seen_by = coverage.seen_by(sample.time_s);
+                let phase = Coverage::phase(seen_by);
+                let Some(index) = summaries.iter().position(|s| s.phase == phase && s.seen_by == seen_by)
+                else {
+                    continue;
+                };
+                if let Some(state) = curve.at(sample.time_s) {
+                    let sum = &mut sums[index][quantity as usize];
+                    sum.0 += norm_squared(residual(sample.value, &state, quantity)); // (12)
+                    sum.1 += 1;
+                }
+            }
+        }
+    }
+    for (summary, sums) in summaries.iter_mut().zip(sums) {
+        summary.rmse = sums.map(|(sum, count)| (count > 0).then(|| (sum / count as f64).sqrt()));
+        summary.sigma = summary.sigma.map(|s| (s / summary.points.max(1) as f64).sqrt());
+    }
+    summaries
+}
+
+fn residual(value: [f64; 3], state: &State, quantity: Quantity) -> [f64; 3] {
+    let fitted = match quantity {
+        Quantity::Position => state.position,
+        Quantity::Velocity => state.velocity,
+    };
+    std::array::from_fn(|i| value[i] - fitted[i])
+}
+
+fn norm_squared(v: [f64; 3]) -> f64 {
+    v.iter().map(|x| x * x).sum()
+}
