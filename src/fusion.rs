@@ -11,7 +11,7 @@ use crate::estimate::EstimateError;
 use crate::estimate::agreement::{self, Disagreement};
 use crate::estimate::characteristic_point::{self, CharacteristicPoint, Height};
 use crate::estimate::coverage::{self, Coverage};
-use crate::estimate::extrapolation::{self, Extrapolation, Holdout};
+use crate::estimate::extrapolation::{self, Holdout};
 use crate::estimate::moving_average::MovingAverage;
 use crate::estimate::polynomial;
 use crate::estimate::spline::{self, Coefficients};
@@ -19,7 +19,7 @@ use crate::estimate::weighted_mean::WeightedMean;
 use crate::quality::{self, PhaseSummary};
 use crate::sample::{Quantity, Source};
 use crate::time::Time;
-use crate::track::{Curve, Method, Phase, Track, TrackPoint};
+use crate::track::{Curve, Method, Phase, State, Track, TrackPoint};
 
 /// What is to be done, every default resolved.
 #[derive(Clone, Debug, PartialEq)]
@@ -109,78 +109,137 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
     let pieces = fit_pieces(sources, &coverage, plan, &mut warnings)?;
 
     let disagreements = agreement::compare(sources);
-    let systematic = Quantity::ALL.map(|q| agreement::systematic_sigma(&disagreements, q));
     warn_of_disagreement(sources, &coverage, &disagreements, &mut warnings);
-
-    let disagree = disagreements.iter().any(Disagreement::is_significant);
-    let point = |piece: &dyn Curve, time_s: f64, phase, method, seen_by| {
-        let mut state = piece.at(time_s)?;
-        // what the datum sees alone is safe from the others, unless they pull the curve away from it
-        if disagree || seen_by != 1 << plan.datum {
-            for axis in 0..3 {
-                state.position_sigma[axis] = state.position_sigma[axis].hypot(systematic[0][axis]);
-                state.velocity_sigma[axis] = state.velocity_sigma[axis].hypot(systematic[1][axis]);
-            }
-        }
-        let time = plan.origin.plus_seconds(time_s);
-        Some(TrackPoint { time, state, phase, method, seen_by })
+    let bands = Bands {
+        systematic: Quantity::ALL.map(|q| agreement::systematic_sigma(&disagreements, q)),
+        everywhere: disagreements.iter().any(Disagreement::is_significant),
+        datum: 1 << plan.datum,
     };
 
     let mut points = Vec::new();
     for piece in &pieces {
-        let start = points.len();
-        for time_s in grid(piece.from_s, piece.to_s, plan.rate_hz) {
-            let seen_by = coverage.seen_by(time_s);
-            points.extend(point(&*piece.curve, time_s, Coverage::phase(seen_by), plan.method, seen_by));
-        }
-        difference_velocities(&mut points[start..]);
+        points.extend(observed(piece, &coverage, &bands, plan));
     }
-
     let (mut plain, mut holdout) = (Vec::new(), None);
     if let Some((piece, settings)) = pieces.last().zip(plan.extrapolation) {
-        let seconds = beyond(piece.to_s, points.last(), plan, settings.horizon_s);
-        // a source that stopped seeing earlier may disagree with those that see the end
-        let seen_by = coverage.seen_by(piece.to_s);
-        let last: Vec<Source> = piece
-            .sources
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| seen_by >> i & 1 == 1)
-            .map(|(_, s)| s.clone())
-            .collect();
-        let plain_settings = extrapolation::Settings {
+        if settings.horizon_s > piece.to_s - piece.from_s {
+            warnings.push(format!(
+                "the track is carried on {} s from {:.2} s that were seen: look at its band before you use it",
+                settings.horizon_s,
+                piece.to_s - piece.from_s
+            ));
+        }
+        let last = seeing_the_end(piece, &coverage);
+        let start_s = points.last().map_or(piece.to_s, |p: &TrackPoint| p.time.seconds_since(plan.origin));
+        let as_printed = extrapolation::Settings {
             order: PLAIN_PCF.0,
             window_s: last_samples_s(&last, piece.to_s, PLAIN_PCF.1),
             prior: None,
             ..settings
         };
-        let carry = |settings, stop_z_m: Option<f64>| -> Result<(Vec<TrackPoint>, Extrapolation), _> {
-            let made = extrapolation::extrapolate(&last, &*piece.curve, piece.from_s, piece.to_s, &settings)?;
-            let carried = seconds
-                .iter()
-                .map_while(|&t| point(&made, t, Phase::Extrapolated, Method::Polynomial, 0))
-                .take_while(|p| stop_z_m.is_none_or(|z| p.state.position[2] <= z))
-                .collect();
-            Ok::<_, EstimateError>((carried, made))
-        };
-        match carry(settings, plan.stop_z_m) {
-            Ok((carried, made)) => {
+        plain = carry_on(piece, &last, &as_printed, start_s, &bands, plan).map_or(Vec::new(), |made| made.0);
+        match carry_on(piece, &last, &settings, start_s, &bands, plan) {
+            Ok((carried, found)) => {
                 points.extend(carried);
-                holdout = Some(made.holdout);
+                holdout = Some(found);
             }
             Err(error) => warnings.push(format!("the track is not extrapolated: {error}")),
-        }
-        if let Ok((carried, _)) = carry(plain_settings, plan.stop_z_m) {
-            plain = carried;
         }
     }
 
     let track = Track { frame_id: plan.frame_id.clone(), points };
     let fitted: Vec<(&[Source], &dyn Curve)> =
         pieces.iter().map(|p| (p.sources.as_slice(), &*p.curve)).collect();
+    Ok(Fusion {
+        events: events(&track, plan, &mut warnings),
+        phases: quality::phases(&track, plan.origin, &fitted, &coverage),
+        plain_pcf: Track { frame_id: plan.frame_id.clone(), points: plain },
+        track,
+        spline: pieces.last().and_then(|p| p.spline),
+        pieces: pieces.iter().map(|p| (p.from_s, p.to_s)).collect(),
+        disagreements,
+        holdout,
+        warnings,
+    })
+}
+
+/// What the bands hold beside a curve's own sigma: what the sources, not being registered, may differ by.
+struct Bands {
+    systematic: [[f64; 3]; 2],
+    /// Whether they differ by so much that they pull the curve away from the datum even where it sees alone.
+    everywhere: bool,
+    /// The datum's bit.
+    datum: u32,
+}
+
+impl Bands {
+    fn widen(&self, mut state: State, seen_by: u32) -> State {
+        if self.everywhere || seen_by != self.datum {
+            let [position, velocity] = self.systematic;
+            for axis in 0..3 {
+                state.position_sigma[axis] = state.position_sigma[axis].hypot(position[axis]);
+                state.velocity_sigma[axis] = state.velocity_sigma[axis].hypot(velocity[axis]);
+            }
+        }
+        state
+    }
+}
+
+/// The points of a piece between its first and last sample.
+fn observed(piece: &Piece, coverage: &Coverage, bands: &Bands, plan: &Plan) -> Vec<TrackPoint> {
+    let point = |time_s| {
+        let seen_by = coverage.seen_by(time_s);
+        Some(TrackPoint {
+            time: plan.origin.plus_seconds(time_s),
+            state: bands.widen(piece.curve.at(time_s)?, seen_by),
+            phase: Coverage::phase(seen_by),
+            method: plan.method,
+            seen_by,
+        })
+    };
+    let mut points: Vec<TrackPoint> =
+        grid(piece.from_s, piece.to_s, plan.rate_hz).filter_map(point).collect();
+    difference_velocities(&mut points);
+    points
+}
+
+/// The points after a piece's last sample, on the grid that its last point, at `start_s`, is on; and how the
+/// extrapolation did from earlier instants.
+fn carry_on(
+    piece: &Piece,
+    sources: &[Source],
+    settings: &extrapolation::Settings,
+    start_s: f64,
+    bands: &Bands,
+    plan: &Plan,
+) -> Result<(Vec<TrackPoint>, Holdout), EstimateError> {
+    let made = extrapolation::extrapolate(sources, &*piece.curve, piece.from_s, piece.to_s, settings)?;
+    let point = |time_s| {
+        Some(TrackPoint {
+            time: plan.origin.plus_seconds(time_s),
+            state: bands.widen(made.at(time_s)?, 0),
+            phase: Phase::Extrapolated,
+            method: Method::Polynomial,
+            seen_by: 0,
+        })
+    };
+    let below = |p: &TrackPoint| plan.stop_z_m.is_none_or(|stop| p.state.position[2] <= stop);
+    let times = grid(start_s, piece.to_s + settings.horizon_s, plan.rate_hz).filter(|&t| t > piece.to_s);
+    Ok((times.map_while(point).take_while(below).collect(), made.holdout))
+}
+
+/// The sources that see a piece's last instant: one that stopped earlier may disagree with them.
+fn seeing_the_end(piece: &Piece, coverage: &Coverage) -> Vec<Source> {
+    let seen_by = coverage.seen_by(piece.to_s);
+    let sources = piece.sources.iter().enumerate().filter(|(i, _)| seen_by >> i & 1 == 1);
+    sources.map(|(_, s)| s.clone()).collect()
+}
+
+/// Characteristic points that the track reaches; a warning for each that it doesn't.
+fn events(track: &Track, plan: &Plan, warnings: &mut Vec<String>) -> Vec<CharacteristicPoint> {
     let mut events = Vec::new();
     for height in &plan.heights {
-        match characteristic_point::first_crossing(&track, height) {
+        match characteristic_point::first_crossing(track, height, 1.5 / plan.rate_hz) {
             Some(event) => events.push(event),
             None => warnings.push(format!(
                 "characteristic point {:?}: the track never rises through z = {} m; it is left out",
@@ -188,17 +247,7 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
             )),
         }
     }
-    Ok(Fusion {
-        phases: quality::phases(&track, plan.origin, &fitted, &coverage),
-        plain_pcf: Track { frame_id: plan.frame_id.clone(), points: plain },
-        track,
-        events,
-        spline: pieces.last().and_then(|p| p.spline),
-        pieces: pieces.iter().map(|p| (p.from_s, p.to_s)).collect(),
-        disagreements,
-        holdout,
-        warnings,
-    })
+    events
 }
 
 /// Fits every piece that can be, and warns of those that can't.
@@ -295,12 +344,6 @@ fn bounded_spacing(spacing_s: f64, samples: usize, from_s: f64, to_s: f64) -> f6
 fn grid(from_s: f64, to_s: f64, rate_hz: f64) -> impl Iterator<Item = f64> {
     let count = ((to_s - from_s) * rate_hz + 1e-6).floor().max(0.0) as usize;
     (0..=count).map(move |i| (from_s + i as f64 / rate_hz).min(to_s))
-}
-
-/// The grid's instants after the last point, up to `horizon_s` after the last sample at `to_s`.
-fn beyond(to_s: f64, last: Option<&TrackPoint>, plan: &Plan, horizon_s: f64) -> Vec<f64> {
-    let start = last.map_or(to_s, |p| p.time.seconds_since(plan.origin)).min(to_s);
-    grid(start, to_s + horizon_s, plan.rate_hz).filter(|&t| t > to_s).collect()
 }
 
 /// The length of the stretch before `to_s` that holds the last `count` sampling instants, s.

@@ -5,7 +5,7 @@
 //! speed's holds its own, and the acceleration times the time's.
 
 use crate::time::Time;
-use crate::track::{Phase, State, Track};
+use crate::track::{Phase, State, Track, TrackPoint};
 
 /// A height to look for.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,14 +31,17 @@ pub struct CharacteristicPoint {
     pub phase: Phase,
 }
 
-/// The first upward crossing of `height`, or `None` where the track never crosses it upwards.
+/// The first upward crossing of `height` between two points at most `max_gap_s` apart, or `None` where there
+/// is none: what happens in a hole of the track nobody knows.
 #[must_use]
-pub fn first_crossing(track: &Track, height: &Height) -> Option<CharacteristicPoint> {
-    let z = |i: usize| track.points[i].state.position[2];
-    let crossing = (1..track.points.len()).find(|&i| z(i - 1) < height.z_m && z(i) >= height.z_m)?;
-    let (before, after) = (&track.points[crossing - 1], &track.points[crossing]);
-    let share = (height.z_m - z(crossing - 1)) / (z(crossing) - z(crossing - 1));
-    let gap_s = after.time.seconds_since(before.time);
+pub fn first_crossing(track: &Track, height: &Height, max_gap_s: f64) -> Option<CharacteristicPoint> {
+    let z = |p: &TrackPoint| p.state.position[2];
+    let (before, after, gap_s) = track.points.windows(2).find_map(|pair| {
+        let gap_s = pair[1].time.seconds_since(pair[0].time);
+        let crosses = z(&pair[0]) < height.z_m && z(&pair[1]) >= height.z_m && gap_s <= max_gap_s;
+        crosses.then_some((&pair[0], &pair[1], gap_s))
+    })?;
+    let share = (height.z_m - z(before)) / (z(after) - z(before));
     let mut state = before.state.mixed(&after.state, share);
     let speed = state.velocity[2];
     let time_sigma_s = (speed > state.velocity_sigma[2]).then(|| state.position_sigma[2] / speed);
@@ -59,7 +62,7 @@ pub fn first_crossing(track: &Track, height: &Height) -> Option<CharacteristicPo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::track::{Method, TrackPoint};
+    use crate::track::Method;
 
     fn track(heights: &[f64]) -> Track {
         let point = |(i, &z): (usize, &f64)| TrackPoint {
@@ -84,8 +87,8 @@ mod tests {
 
     #[test]
     fn the_first_upward_crossing_counts_with_its_uncertainty() {
-        let found =
-            first_crossing(&track(&[-1.0, -3.0, -2.0, 0.0, 2.0, -5.0, 5.0]), &at(-0.5)).expect("crossed");
+        let found = first_crossing(&track(&[-1.0, -3.0, -2.0, 0.0, 2.0, -5.0, 5.0]), &at(-0.5), 1.5)
+            .expect("crossed");
         assert_eq!(found.time, Time::from_ns(2_750_000_000));
         assert_eq!(found.time_sigma_s, Some(0.2)); // 0.4 m at 2 m/s
         assert!((found.state.velocity_sigma[2] - 0.3_f64.hypot(0.6)).abs() < 1e-12);
@@ -93,7 +96,13 @@ mod tests {
 
     #[test]
     fn a_height_that_is_never_reached_or_only_left_is_no_point() {
-        assert_eq!(first_crossing(&track(&[-3.0, -2.0, -1.0]), &at(0.0)), None);
-        assert_eq!(first_crossing(&track(&[3.0, 2.0, -1.0]), &at(0.0)), None);
+        assert_eq!(first_crossing(&track(&[-3.0, -2.0, -1.0]), &at(0.0), 1.5), None);
+        assert_eq!(first_crossing(&track(&[3.0, 2.0, -1.0]), &at(0.0), 1.5), None);
+    }
+
+    #[test]
+    fn a_crossing_in_a_hole_of_the_track_is_no_point() {
+        assert!(first_crossing(&track(&[-1.0, 1.0]), &at(0.0), 1.5).is_some());
+        assert_eq!(first_crossing(&track(&[-1.0, 1.0]), &at(0.0), 0.5), None);
     }
 }
