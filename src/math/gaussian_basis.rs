@@ -141,7 +141,7 @@ impl GaussianBasis {
             power *= ratio;
         }
         for i in 0..n {
-            let x = f - start - i as i32 as f64;
+            let x = f - start - f64::from(i as i32);
             slope[i] = -x * per_h * value[i];
             curvature[i] = (x * x * per_square - 1.0) * per_h2 * value[i];
         }

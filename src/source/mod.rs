@@ -3,6 +3,7 @@
 //! [`recognise`] makes the same source tables out of topic names that a config would hold; [`load`] reads
 //! them, recognised or configured, so that there is one way in.
 
+mod gathered;
 mod load;
 mod reading;
 mod recognise;

@@ -183,12 +183,13 @@ fn check(sources: &[Source]) -> Result<(), EstimateError> {
 
 /// What is wrong with a sample that [`check`] found.
 fn bad_number(source: &Source, quantity: Quantity, sample: &Sample) -> EstimateError {
-    let infinite = |v: &&f64| !v.is_finite();
-    let (value, expected) =
-        sample.value.iter().find(infinite).map(|&v| (v, "a finite number")).unwrap_or_else(|| {
-            let sigma = sample.sigma.iter().find(|v| !(**v > 0.0 && v.is_finite()));
-            sigma.map_or((sample.time_s, "a finite time"), |&v| (v, "a positive sigma"))
-        });
+    let value = sample.value.iter().find(|v| !v.is_finite());
+    let sigma = sample.sigma.iter().find(|v| !(**v > 0.0 && v.is_finite()));
+    let (value, expected) = match (value, sigma) {
+        (Some(&v), _) => (v, "a finite number"),
+        (None, Some(&v)) => (v, "a positive sigma"),
+        (None, None) => (sample.time_s, "a finite time"),
+    };
     let what = format!("{} of {}", quantity.name(), source.name);
     EstimateError::BadNumber { what, time_s: sample.time_s, value, expected }
 }

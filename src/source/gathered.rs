@@ -1,0 +1,272 @@
+//! The readings of one source as they come, what was wrong with them, and at last its samples.
+
+use std::collections::BTreeMap;
+
+use super::SourceError;
+use super::load::{Loaded, SigmaOrigin, Timing};
+use super::reading::{Clock, Fault, Outcome, Reading};
+use crate::config::SourceConfig;
+use crate::estimate::noise;
+use crate::log::decode::{DecodeError, MessagePath};
+use crate::math::robust;
+use crate::printable::printable;
+use crate::sample::{Quantity, Sample, Source};
+use crate::time::Time;
+
+/// A stamp that lies this much before its predecessor is worth a warning.
+const BACKWARD_S: f64 = 1.0;
+
+/// Readings of one source as they come.
+pub(super) struct Gathered {
+    pub(super) config: SourceConfig,
+    pub(super) paths: Vec<(Quantity, MessagePath)>,
+    readings: [Vec<Reading>; 2],
+    delays_s: Vec<f64>,
+    clocks: [usize; 3],
+    frame_id: Option<String>,
+    pub(super) messages: usize,
+    pub(super) undecodable: Option<(usize, DecodeError)>,
+    faults: BTreeMap<&'static str, usize>,
+    first_fault: [Option<Fault>; 2],
+    farthest_back_s: f64,
+    pub(super) untimed: usize,
+}
+
+impl Gathered {
+    pub(super) fn new(config: &SourceConfig) -> Result<Self, SourceError> {
+        let given = [(Quantity::Position, &config.position), (Quantity::Velocity, &config.velocity)];
+        let parse = |(quantity, text): (Quantity, &Option<String>)| {
+            let text = text.as_ref()?;
+            let path = MessagePath::parse(text);
+            Some(
+                path.map(|p| (quantity, p))
+                    .map_err(|error| SourceError::Path { name: config.name.clone(), error }),
+            )
+        };
+        Ok(Self {
+            config: config.clone(),
+            paths: given.into_iter().filter_map(parse).collect::<Result<_, _>>()?,
+            readings: [Vec::new(), Vec::new()],
+            delays_s: Vec::new(),
+            clocks: [0; 3],
+            frame_id: None,
+            messages: 0,
+            undecodable: None,
+            faults: BTreeMap::new(),
+            first_fault: [None, None],
+            farthest_back_s: 0.0,
+            untimed: 0,
+        })
+    }
+
+    pub(super) fn add(&mut self, outcome: Outcome) {
+        self.clocks[match outcome.clock {
+            Clock::Stamp => 0,
+            Clock::Publish => 1,
+            Clock::Log => 2,
+        }] += 1;
+        self.delays_s.push(outcome.delay_s);
+        if self.frame_id.is_none() {
+            self.frame_id = outcome.frame_id;
+        }
+        for (quantity, result) in outcome.vectors {
+            let q = quantity as usize;
+            match result {
+                Ok(reading) => {
+                    if let Some(last) = self.readings[q].last() {
+                        let back = last.time.seconds_since(reading.time);
+                        self.farthest_back_s = self.farthest_back_s.max(back);
+                    }
+                    self.readings[q].push(reading);
+                }
+                Err(fault) => {
+                    if let Some(what) = fault.description() {
+                        *self.faults.entry(what).or_default() += 1;
+                        self.first_fault[q].get_or_insert(fault);
+                    }
+                }
+            }
+        }
+    }
+
+    /// What stands against using it, and the quantity at fault where it is one: a path that gave nothing at
+    /// all, or samples that are all of one instant.
+    pub(super) fn lack(&mut self) -> Option<(Option<Quantity>, SourceError)> {
+        let name = self.config.name.clone();
+        if let Some((count, _)) = self.undecodable
+            && count == self.messages
+            && let Some((_, error)) = self.undecodable.take()
+        {
+            let topic = self.paths.first().map_or(String::new(), |(_, p)| p.topic.clone());
+            return Some((None, SourceError::Decode { name, topic, error }));
+        }
+        if self.untimed > 0 && self.clocks == [0; 3] {
+            let (choice, count) = (self.config.time, self.untimed);
+            return Some((None, SourceError::NoTime { name, choice, count }));
+        }
+        for (quantity, path) in &self.paths {
+            let q = *quantity as usize;
+            if !self.readings[q].is_empty() {
+                continue;
+            }
+            let (found, fits) = match self.first_fault[q].take() {
+                Some(Fault::Miss(miss)) => return Some((Some(*quantity), SourceError::Miss { name, miss })),
+                Some(Fault::NoOrientation) => {
+                    let path = path.to_string();
+                    return Some((Some(*quantity), SourceError::NoOrientation { name, path }));
+                }
+                Some(Fault::NoVector { kind, fits }) => (kind, fits),
+                Some(fault) => (fault.description().unwrap_or_default(), Vec::new()),
+                None => {
+                    let topic = path.topic.clone();
+                    return Some((Some(*quantity), SourceError::Empty { name, topic }));
+                }
+            };
+            let spare = self.paths.len() > 1 && *quantity == Quantity::Velocity;
+            let (path, count) = (path.to_string(), self.messages);
+            let error = SourceError::NoVector { name, path, found, fits, spare, count };
+            return Some((Some(*quantity), error));
+        }
+        let times = || self.readings.iter().flatten().map(|r| r.time);
+        match (times().min(), times().max(), times().count()) {
+            (Some(time), Some(last), count) if count > 2 && time == last => {
+                Some((None, SourceError::OneInstant { name, time, count }))
+            }
+            _ => None,
+        }
+    }
+
+    /// Leaves out one of the quantities, or all of the source, and says which.
+    pub(super) fn drop(&mut self, quantity: Option<Quantity>) -> &'static str {
+        match quantity {
+            Some(Quantity::Velocity) if self.paths.len() > 1 => {
+                self.config.velocity = None;
+                self.paths.retain(|(q, _)| *q != Quantity::Velocity);
+                "a velocity"
+            }
+            _ => {
+                self.paths.clear();
+                self.readings = [Vec::new(), Vec::new()];
+                "a source"
+            }
+        }
+    }
+
+    pub(super) fn median_time(&self) -> Time {
+        let mut times: Vec<Time> = self.readings.iter().flatten().map(|r| r.time).collect();
+        let middle = times.len() / 2;
+        if times.is_empty() { Time::from_ns(0) } else { *times.select_nth_unstable(middle).1 }
+    }
+
+    pub(super) fn finish(mut self, origin: Time) -> Loaded {
+        let warnings = self.warnings();
+        let mut source = Source { name: self.config.name.clone(), ..Source::default() };
+        let mut sigma = [None, None];
+        for quantity in Quantity::ALL {
+            let readings = std::mem::take(&mut self.readings[quantity as usize]);
+            let configured = match quantity {
+                Quantity::Position => self.config.position_sigma_m,
+                Quantity::Velocity => self.config.velocity_sigma_m_s,
+            };
+            (*source.series_mut(quantity), sigma[quantity as usize]) = samples(readings, origin, configured);
+        }
+        let names = ["stamp", "publish", "log"];
+        let used: Vec<&str> =
+            names.iter().zip(self.clocks).filter(|(_, n)| *n > 0).map(|(name, _)| *name).collect();
+        let quantile = |delays: &mut Vec<f64>, share| robust::quantile(delays, share).unwrap_or(0.0);
+        let timing = Timing {
+            clock: used.join("+"),
+            delay_s: quantile(&mut self.delays_s, 0.5),
+            delay_spread_s: 0.5 * (quantile(&mut self.delays_s, 0.84) - quantile(&mut self.delays_s, 0.16)),
+        };
+        Loaded {
+            config: self.config.clone(),
+            source,
+            frame_id: self.frame_id.unwrap_or_default(),
+            timing,
+            sigma,
+            warnings,
+        }
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let name = printable(&self.config.name);
+        let mut warnings = Vec::new();
+        if let Some((count, error)) = &self.undecodable {
+            warnings.push(format!("{name}: {count} of {} messages can't be decoded: {error}", self.messages));
+        }
+        for (what, count) in &self.faults {
+            warnings.push(format!("{name}: {count} samples are left out: {what}"));
+        }
+        if self.untimed > 0 {
+            warnings
+                .push(format!("{name}: {} messages are left out: they have no usable time", self.untimed));
+        }
+        if self.clocks.iter().filter(|n| **n > 0).count() > 1 {
+            let [stamp, publish, log] = self.clocks;
+            warnings.push(format!(
+                "{name}: {stamp} samples are timed by stamp, {publish} by publish time, {log} by log time: set \
+                 `time` for this source"
+            ));
+        }
+        if self.farthest_back_s > BACKWARD_S {
+            warnings.push(format!(
+                "{name}: times go back by up to {:.1} s from one message to the next",
+                self.farthest_back_s
+            ));
+        }
+        warnings
+    }
+}
+
+impl Fault {
+    /// What is wrong; `None` where nothing is.
+    fn description(&self) -> Option<&'static str> {
+        match self {
+            Self::Miss(_) => Some("the path leads nowhere in them"),
+            Self::NoVector { .. } => Some("no vector at the path"),
+            Self::NotFinite => Some("NaN or infinite"),
+            Self::NoOrientation => Some("no orientation of unit length to turn the velocity by"),
+            Self::Filtered => None,
+        }
+    }
+}
+
+type Sigma = Option<(f64, SigmaOrigin)>;
+
+/// Readings in order of time with a sigma each, and the median sigma with its origin.
+fn samples(mut readings: Vec<Reading>, origin: Time, configured: Option<f64>) -> (Vec<Sample>, Sigma) {
+    readings.sort_by_key(|r| r.time);
+    let from_messages = readings.iter().any(|r| r.sigma.is_some());
+    let mut samples: Vec<Sample> = readings
+        .iter()
+        .map(|r| Sample {
+            time_s: r.time.seconds_since(origin),
+            value: r.value,
+            sigma: configured.map_or(r.sigma.unwrap_or([f64::NAN; 3]), |s| [s; 3]),
+        })
+        .collect();
+    if samples.is_empty() {
+        return (samples, None);
+    }
+    let origin = match (configured, from_messages) {
+        (Some(_), _) => SigmaOrigin::Config,
+        (None, true) => {
+            // messages without one take the median of the others
+            let mut known: Vec<f64> = readings.iter().filter_map(|r| r.sigma).flatten().collect();
+            let median = robust::median(&mut known).unwrap_or(1.0);
+            for sample in samples.iter_mut().filter(|s| s.sigma[0].is_nan()) {
+                sample.sigma = [median; 3];
+            }
+            SigmaOrigin::Messages
+        }
+        (None, false) => {
+            let estimated = noise::estimate_sigma(&samples);
+            samples.iter_mut().for_each(|s| s.sigma = [estimated.unwrap_or(1.0); 3]);
+            if estimated.is_some() { SigmaOrigin::Estimated } else { SigmaOrigin::Assumed }
+        }
+    };
+    let mut all: Vec<f64> = samples.iter().flat_map(|s| s.sigma).collect();
+    let median = robust::median(&mut all).map(|m| (m, origin));
+    (samples, median)
+}
