@@ -8,6 +8,10 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::estimate::spline::Coefficients;
+use crate::log::Compression;
+use crate::track::Method;
+
 /// Why a config can't be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
@@ -107,19 +111,6 @@ impl Default for Output {
     }
 }
 
-/// Compression of the new chunks.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Compression {
-    /// Zstandard.
-    #[default]
-    Zstd,
-    /// LZ4.
-    Lz4,
-    /// None.
-    None,
-}
-
 /// One sensor.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -192,7 +183,7 @@ pub enum VelocityFrame {
 #[serde(deny_unknown_fields, default)]
 pub struct Fusion {
     /// The estimator.
-    pub method: FusionMethod,
+    pub method: Method,
     /// Whether the velocity is the derivative of the position (`shared`), or both are fitted apart.
     pub coefficients: Coefficients,
     /// What is registered between sources: "auto" for all that the program can, [] for nothing.
@@ -211,7 +202,7 @@ pub struct Fusion {
 impl Default for Fusion {
     fn default() -> Self {
         Self {
-            method: FusionMethod::Sff,
+            method: Method::Spline,
             coefficients: Coefficients::Shared,
             estimate: Registration::Auto(Auto::Auto),
             knot_spacing_s: None,
@@ -220,32 +211,6 @@ impl Default for Fusion {
             bridge_max_s: 5.0,
         }
     }
-}
-
-/// The estimator.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum FusionMethod {
-    /// General data fusion, the weighted mean.
-    Gdf,
-    /// Polynomial constraint fusion.
-    Pcf,
-    /// Spline function fusion.
-    #[default]
-    Sff,
-    /// Moving average over GDF.
-    MovingAverage,
-}
-
-/// Whether position and velocity share coefficients.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Coefficients {
-    /// The velocity is the derivative of the position.
-    #[default]
-    Shared,
-    /// Both are fitted apart, as Zhang 2025 says literally.
-    Independent,
 }
 
 /// What is registered between sources.

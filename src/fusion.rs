@@ -7,7 +7,6 @@
 //! 4. The last piece is carried on ([`extrapolation`]), and once more the paper's plain way.
 //! 5. Characteristic points are looked up on the track.
 
-use crate::estimate::EstimateError;
 use crate::estimate::agreement::{self, Disagreement};
 use crate::estimate::characteristic_point::{self, CharacteristicPoint, Height};
 use crate::estimate::coverage::{self, Coverage};
@@ -16,6 +15,7 @@ use crate::estimate::moving_average::MovingAverage;
 use crate::estimate::polynomial;
 use crate::estimate::spline::{self, Coefficients};
 use crate::estimate::weighted_mean::WeightedMean;
+use crate::estimate::{self, EstimateError};
 use crate::quality::{self, PhaseSummary};
 use crate::sample::{Quantity, Source};
 use crate::time::Time;
@@ -102,19 +102,17 @@ struct Piece {
 /// Fuses `sources`, each in order of time.
 ///
 /// # Errors
-/// [`EstimateError`] of the first piece when no piece of the log can be fitted.
+/// [`EstimateError::BadNumber`] as [`estimate::check`]; that of the first piece when no piece can be fitted.
 pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
+    estimate::check(sources)?;
     let coverage = Coverage::of(sources);
     let mut warnings = Vec::new();
     let pieces = fit_pieces(sources, &coverage, plan, &mut warnings)?;
 
     let disagreements = agreement::compare(sources);
-    warn_of_disagreement(sources, &coverage, &disagreements, &mut warnings);
-    let bands = Bands {
-        systematic: Quantity::ALL.map(|q| agreement::systematic_sigma(&disagreements, q)),
-        everywhere: disagreements.iter().any(Disagreement::is_significant),
-        datum: 1 << plan.datum,
-    };
+    let bands = Bands::of(sources, &coverage, &disagreements, plan);
+    warn_of_disagreement(sources, &disagreements, &mut warnings);
+    warn_of_misfit(&pieces, &disagreements, &mut warnings);
 
     let mut points = Vec::new();
     for piece in &pieces {
@@ -165,20 +163,47 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
 
 /// What the bands hold beside a curve's own sigma: what the sources, not being registered, may differ by.
 struct Bands {
+    /// In position, m, and velocity, m/s, by axis.
     systematic: [[f64; 3]; 2],
     /// Whether they differ by so much that they pull the curve away from the datum even where it sees alone.
     everywhere: bool,
-    /// The datum's bit.
+    /// Whether a source could not be compared with the datum in position or velocity, so that without the
+    /// datum nobody knows how sure the track is.
+    unknown: [bool; 2],
+    /// The datum's bit, and when it sees, s.
     datum: u32,
+    datum_runs: Vec<(f64, f64)>,
 }
 
 impl Bands {
-    fn widen(&self, mut state: State, seen_by: u32) -> State {
-        if self.everywhere || seen_by != self.datum {
-            let [position, velocity] = self.systematic;
-            for axis in 0..3 {
-                state.position_sigma[axis] = state.position_sigma[axis].hypot(position[axis]);
-                state.velocity_sigma[axis] = state.velocity_sigma[axis].hypot(velocity[axis]);
+    fn of(sources: &[Source], coverage: &Coverage, disagreements: &[Disagreement], plan: &Plan) -> Self {
+        let apart = |q| agreement::uncompared(sources, disagreements, q);
+        Self {
+            systematic: Quantity::ALL.map(|q| agreement::systematic_sigma(disagreements, q)),
+            everywhere: disagreements.iter().any(Disagreement::is_significant),
+            unknown: Quantity::ALL
+                .map(|q| apart(q).iter().any(|pair| pair.0 == plan.datum || pair.1 == plan.datum)),
+            datum: 1 << plan.datum,
+            datum_runs: coverage.runs(plan.datum).to_vec(),
+        }
+    }
+
+    /// The state with the sigmas that it deserves; NaN for those that nobody knows.
+    fn widen(&self, mut state: State, time_s: f64, seen_by: u32) -> State {
+        let [position, velocity] = self.systematic;
+        // away from the datum, velocities that differ make positions drift apart
+        let away = |run: &(f64, f64)| (run.0 - time_s).max(time_s - run.1).max(0.0);
+        let away_s = self.datum_runs.iter().map(away).fold(f64::INFINITY, f64::min);
+        let away_s = if away_s.is_finite() { away_s } else { 0.0 };
+        for axis in 0..3 {
+            let (p, v) = (&mut state.position_sigma[axis], &mut state.velocity_sigma[axis]);
+            if self.everywhere || seen_by != self.datum {
+                *p = p.hypot(position[axis] + velocity[axis] * away_s);
+                *v = v.hypot(velocity[axis]);
+            }
+            if seen_by & self.datum == 0 {
+                *p = if self.unknown[0] { f64::NAN } else { *p };
+                *v = if self.unknown[1] { f64::NAN } else { *v };
             }
         }
         state
@@ -191,7 +216,7 @@ fn observed(piece: &Piece, coverage: &Coverage, bands: &Bands, plan: &Plan) -> V
         let seen_by = coverage.seen_by(time_s);
         Some(TrackPoint {
             time: plan.origin.plus_seconds(time_s),
-            state: bands.widen(piece.curve.at(time_s)?, seen_by),
+            state: bands.widen(piece.curve.at(time_s)?, time_s, seen_by),
             phase: Coverage::phase(seen_by),
             method: plan.method,
             seen_by,
@@ -217,7 +242,7 @@ fn carry_on(
     let point = |time_s| {
         Some(TrackPoint {
             time: plan.origin.plus_seconds(time_s),
-            state: bands.widen(made.at(time_s)?, 0),
+            state: bands.widen(made.at(time_s)?, time_s, 0),
             phase: Phase::Extrapolated,
             method: Method::Polynomial,
             seen_by: 0,
@@ -368,12 +393,7 @@ fn difference_velocities(points: &mut [TrackPoint]) {
     }
 }
 
-fn warn_of_disagreement(
-    sources: &[Source],
-    coverage: &Coverage,
-    disagreements: &[Disagreement],
-    warnings: &mut Vec<String>,
-) {
+fn warn_of_disagreement(sources: &[Source], disagreements: &[Disagreement], warnings: &mut Vec<String>) {
     for d in disagreements.iter().filter(|d| d.is_significant()) {
         let (first, second) = (&sources[d.sources.0].name, &sources[d.sources.1].name);
         let (what, unit) = (d.quantity.name(), d.quantity.unit());
@@ -384,20 +404,30 @@ fn warn_of_disagreement(
              band is widened by that much",
         ));
     }
-    for second in 0..sources.len() {
-        for first in 0..second {
-            let meet = coverage
-                .runs(first)
-                .iter()
-                .any(|a| coverage.runs(second).iter().any(|b| a.0 <= b.1 && b.0 <= a.1));
-            if !meet {
-                warnings.push(format!(
-                    "{} and {} never see the vehicle at the same time: nobody can say whether they agree, and \
-                     the bands don't hold a disagreement",
-                    sources[first].name, sources[second].name
-                ));
-            }
+    for quantity in Quantity::ALL {
+        for (first, second) in agreement::uncompared(sources, disagreements, quantity) {
+            let what = quantity.name();
+            warnings.push(format!(
+                "{} and {} never measure {what} at the same time: nobody can say whether they agree, and where \
+                 the datum doesn't see the track has no sigma of its {what}",
+                sources[first].name, sources[second].name
+            ));
         }
+    }
+}
+
+/// Residuals this many times the sigmas mean that something is wrong with one or the other.
+const MISFIT: f64 = 2.0;
+
+/// Warns of a fit that leaves more than noise, where no known disagreement explains it.
+fn warn_of_misfit(pieces: &[Piece], disagreements: &[Disagreement], warnings: &mut Vec<String>) {
+    let scales = pieces.iter().filter_map(|p| p.spline).flat_map(|s| s.noise_scale);
+    let worst = scales.fold(0.0, f64::max);
+    if worst > MISFIT && !disagreements.iter().any(Disagreement::is_significant) {
+        warnings.push(format!(
+            "the samples lie up to {worst:.1} times their sigmas from the track (root mean square): outliers, \
+             sigmas that are too small, or sources that disagree; the bands are widened by that factor"
+        ));
     }
 }
 

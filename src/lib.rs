@@ -34,6 +34,7 @@ mod printable;
 pub mod publish;
 pub mod quality;
 pub mod report;
+pub mod resolve;
 pub mod sample;
 pub mod simulate;
 pub mod source;

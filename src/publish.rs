@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::estimate::characteristic_point::CharacteristicPoint;
+use crate::fusion::Fusion;
 use crate::log::NewChannel;
 use crate::time::Time;
 use crate::track::{Track, TrackPoint};
@@ -225,6 +226,34 @@ pub fn log_messages(summary: &str, warnings: &[String], time: Time) -> Vec<Publi
     let mut messages = vec![message(INFO, summary)];
     messages.extend(warnings.iter().map(|w| message(WARNING, w)));
     messages
+}
+
+/// All new messages in order of time; the summary stands at the track's first instant.
+pub fn messages<'a>(
+    fusion: &'a Fusion,
+    labels: Labels<'a>,
+    text: &str,
+    warnings: &[String],
+) -> impl Iterator<Item = Published> + 'a {
+    let frame = &fusion.track.frame_id;
+    let start = fusion.track.points.first().map_or(labels.t0, |p| p.time);
+    let head = log_messages(text, warnings, start);
+    let events = fusion.events.iter().filter_map(move |e| event_message(e, frame, &labels));
+    let mut streams = [
+        Box::new(track_messages(Topic::Track, &fusion.track, labels))
+            as Box<dyn Iterator<Item = Published> + 'a>,
+        Box::new(track_messages(Topic::Pcf, &fusion.plain_pcf, labels)),
+        Box::new({
+            let mut events: Vec<Published> = events.collect();
+            events.sort_by_key(|e| e.time);
+            events.into_iter()
+        }),
+    ]
+    .map(Iterator::peekable);
+    head.into_iter().chain(std::iter::from_fn(move || {
+        let next = (0..streams.len()).filter_map(|i| Some((streams[i].peek()?.time, i))).min()?;
+        streams[next.1].next()
+    }))
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use crate::estimate::coverage::Coverage;
 use crate::sample::{Quantity, Source};
 use crate::time::Time;
-use crate::track::{Curve, Phase, State, Track};
+use crate::track::{Curve, Phase, State, Track, TrackPoint};
 
 /// One kind of stretch of the track, summed over the log.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,8 +19,10 @@ pub struct PhaseSummary {
     /// Root mean square distance of the samples from the track (Zhang 2025, eq. 12, over three axes), m and
     /// m/s; `None` where nothing was measured.
     pub rmse: [Option<f64>; 2],
-    /// Root mean square of the points' 3-D standard deviation, m and m/s.
+    /// Root mean square of the points' 3-D standard deviation, m and m/s; NaN where nobody knows it.
     pub sigma: [f64; 2],
+    /// Number of separate stretches.
+    pub stretches: usize,
 }
 
 /// Sums up the track and the samples' distances from it, phase by phase, in order of first appearance.
@@ -32,22 +34,32 @@ pub fn phases(
     coverage: &Coverage,
 ) -> Vec<PhaseSummary> {
     let mut summaries: Vec<PhaseSummary> = Vec::new();
-    let find = |summaries: &mut Vec<PhaseSummary>, phase, seen_by, t: f64| -> usize {
-        let known = summaries.iter().position(|s| s.phase == phase && s.seen_by == seen_by);
-        known.unwrap_or_else(|| {
-            let (span_s, points) = ((t, t), 0);
-            summaries.push(PhaseSummary { phase, seen_by, span_s, points, rmse: [None; 2], sigma: [0.0; 2] });
+    for stretch in track.points.chunk_by(|a, b| (a.phase, a.seen_by) == (b.phase, b.seen_by)) {
+        let TrackPoint { phase, seen_by, time: from, .. } = stretch[0];
+        let (from_s, to_s) =
+            (from.seconds_since(origin), stretch[stretch.len() - 1].time.seconds_since(origin));
+        let known = summaries.iter().position(|s| (s.phase, s.seen_by) == (phase, seen_by));
+        let index = known.unwrap_or_else(|| {
+            let (rmse, sigma) = ([None; 2], [0.0; 2]);
+            summaries.push(PhaseSummary {
+                phase,
+                seen_by,
+                span_s: (from_s, to_s),
+                points: 0,
+                stretches: 0,
+                rmse,
+                sigma,
+            });
             summaries.len() - 1
-        })
-    };
-    for point in &track.points {
-        let t = point.time.seconds_since(origin);
-        let index = find(&mut summaries, point.phase, point.seen_by, t);
+        });
         let summary = &mut summaries[index];
-        summary.span_s.1 = t;
-        summary.points += 1;
-        summary.sigma[0] += norm_squared(point.state.position_sigma);
-        summary.sigma[1] += norm_squared(point.state.velocity_sigma);
+        summary.span_s.1 = to_s;
+        summary.points += stretch.len();
+        summary.stretches += 1;
+        for point in stretch {
+            summary.sigma[0] += norm_squared(point.state.position_sigma);
+            summary.sigma[1] += norm_squared(point.state.velocity_sigma);
+        }
     }
     let mut sums = vec![[(0.0, 0_usize); 2]; summaries.len()];
     for (sources, curve) in pieces {

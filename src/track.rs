@@ -1,5 +1,8 @@
 //! The one thing that every estimator makes: a track.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::time::Time;
 
 /// A curve's state at one instant, as an estimator knows it.
@@ -65,15 +68,20 @@ impl Phase {
 }
 
 /// How a point was made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 pub enum Method {
     /// General data fusion, the weighted mean.
+    #[serde(rename = "gdf")]
     WeightedMean,
     /// Polynomial constraint fusion.
+    #[serde(rename = "pcf")]
     Polynomial,
     /// Spline function fusion.
+    #[default]
+    #[serde(rename = "sff")]
     Spline,
     /// Moving average over the weighted mean.
+    #[serde(rename = "moving-average")]
     MovingAverage,
 }
 

@@ -14,6 +14,7 @@ use crate::config::ConfigError;
 use crate::estimate::EstimateError;
 use crate::log::LogError;
 use crate::printable::printable;
+use crate::resolve::ResolveError;
 use crate::simulate::SimulateError;
 use crate::source::SourceError;
 use crate::time::Time;
@@ -45,21 +46,9 @@ pub enum CommandError {
     /// The simulator.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
-    /// The track would have more points than anyone can read.
-    #[error(
-        "output.rate_hz is {rate_hz}, which makes {points:.0} points over {span_s:.0} s with the extrapolation, expected \
-         at most {most:.0}"
-    )]
-    TooManyPoints {
-        /// The rate that was asked for, Hz.
-        rate_hz: f64,
-        /// How long the track is, s.
-        span_s: f64,
-        /// How many points that makes.
-        points: f64,
-        /// How many there may be.
-        most: f64,
-    },
+    /// What was asked can't be done for these sources.
+    #[error(transparent)]
+    Resolve(#[from] ResolveError),
     /// The track is no track.
     #[error("the track is not finite at {time}: some samples are too large to compute with")]
     NotFinite {
@@ -92,7 +81,7 @@ impl CommandError {
             Self::Config(error) => error.hint(),
             Self::Log(error) => error.hint(),
             Self::Source(error) => error.hint(),
-            Self::TooManyPoints { .. } => Some("lower `output.rate_hz` or `extrapolation.horizon_s`".into()),
+            Self::Resolve(error) => Some(error.hint()),
             _ => None,
         }
     }
@@ -101,7 +90,7 @@ impl CommandError {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         let usage = match self {
-            Self::Config(_) | Self::TooManyPoints { .. } | Self::File { .. } => true,
+            Self::Config(_) | Self::Resolve(_) | Self::File { .. } => true,
             Self::Source(SourceError::Log(error)) | Self::Log(error) => is_usage(error),
             Self::Source(error) => error.is_usage(),
             Self::Simulate(error) => is_of_scenario(error),

@@ -12,9 +12,6 @@ use crate::sample::{Quantity, Sample, Source};
 /// quantities, once in 2,600 pairs of honest sources.
 const SIGNIFICANT_SIGMAS: f64 = 4.0;
 
-/// Fewest differences that say anything.
-const MIN_DIFFERENCES: usize = 5;
-
 /// How two sources differ in one quantity where both see.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Disagreement {
@@ -82,7 +79,7 @@ fn summarise(
     quantity: Quantity,
 ) -> Option<Disagreement> {
     let count = differences.len();
-    if count < MIN_DIFFERENCES {
+    if count == 0 {
         return None;
     }
     let (mut medians, mut sigmas) = ([0.0; 3], [0.0; 3]);
@@ -107,6 +104,21 @@ fn lag_one_correlation(values: &[f64]) -> f64 {
     let squares: f64 = values.iter().map(|v| v * v).sum();
     let products: f64 = values.windows(2).map(|w| w[0] * w[1]).sum();
     if squares > 0.0 { products / squares } else { 0.0 }
+}
+
+/// Pairs of sources that both measure `quantity`, but never so that it could be compared.
+#[must_use]
+pub fn uncompared(
+    sources: &[Source],
+    disagreements: &[Disagreement],
+    quantity: Quantity,
+) -> Vec<(usize, usize)> {
+    let measures = |i: usize| !sources[i].series(quantity).is_empty();
+    let compared = |pair| disagreements.iter().any(|d| d.quantity == quantity && d.sources == pair);
+    let pairs = (0..sources.len()).flat_map(|second| (0..second).map(move |first| (first, second)));
+    pairs
+        .filter(|&(first, second)| measures(first) && measures(second) && !compared((first, second)))
+        .collect()
 }
 
 /// By axis, the largest difference in `quantity` between any two sources, but no less than that difference's
@@ -170,6 +182,9 @@ mod tests {
     fn sources_that_never_meet_are_not_compared() {
         let found = compare(&[source(1, 0.0, 0.0, 0.02), source(2, 9.0, 5.0, 0.02)]);
         assert!(found.is_empty());
+        let apart = [source(1, 0.0, 0.0, 0.02), source(2, 9.0, 5.0, 0.02)];
+        assert_eq!(uncompared(&apart, &found, Quantity::Position), [(0, 1)]);
+        assert!(uncompared(&apart, &found, Quantity::Velocity).is_empty());
         assert_eq!(systematic_sigma(&found, Quantity::Position), [0.0; 3]);
     }
 }

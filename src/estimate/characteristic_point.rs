@@ -44,12 +44,14 @@ pub fn first_crossing(track: &Track, height: &Height, max_gap_s: f64) -> Option<
     let share = (height.z_m - z(before)) / (z(after) - z(before));
     let mut state = before.state.mixed(&after.state, share);
     let speed = state.velocity[2];
+    // NaN where nobody knows the height's sigma, and then nobody knows the rest either
     let time_sigma_s = (speed > state.velocity_sigma[2]).then(|| state.position_sigma[2] / speed);
     let acceleration = state.acceleration.unwrap_or_default();
     for axis in 0..3 {
         let from_time = acceleration[axis] * time_sigma_s.unwrap_or(0.0);
         state.velocity_sigma[axis] = state.velocity_sigma[axis].hypot(from_time);
     }
+    let time_sigma_s = time_sigma_s.filter(|s| s.is_finite());
     Some(CharacteristicPoint {
         name: height.name.clone(),
         time: before.time.plus_seconds(share * gap_s),

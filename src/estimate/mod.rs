@@ -10,6 +10,8 @@ pub mod polynomial;
 pub mod spline;
 pub mod weighted_mean;
 
+use crate::sample::{Quantity, Sample, Source};
+
 /// Why an estimator has no answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EstimateError {
@@ -43,4 +45,37 @@ pub enum EstimateError {
         /// What is missing.
         why: &'static str,
     },
+}
+
+/// Refuses samples that no estimator can use.
+///
+/// # Errors
+/// [`EstimateError::BadNumber`] for the first value or time that is not finite, or sigma that is not positive.
+pub fn check(sources: &[Source]) -> Result<(), EstimateError> {
+    for source in sources {
+        for quantity in Quantity::ALL {
+            let good = |s: &Sample| {
+                // a sum is finite only where all of its terms are
+                let sum: f64 = s.value.iter().chain(&s.sigma).sum::<f64>() + s.time_s;
+                sum.is_finite() && s.sigma.iter().all(|v| *v > 0.0)
+            };
+            if let Some(sample) = source.series(quantity).iter().find(|s| !good(s)) {
+                return Err(bad_number(source, quantity, sample));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What is wrong with a sample that [`check()`] found.
+fn bad_number(source: &Source, quantity: Quantity, sample: &Sample) -> EstimateError {
+    let value = sample.value.iter().find(|v| !v.is_finite());
+    let sigma = sample.sigma.iter().find(|v| !(**v > 0.0 && v.is_finite()));
+    let (value, expected) = match (value, sigma) {
+        (Some(&v), _) => (v, "a finite number"),
+        (None, Some(&v)) => (v, "a positive sigma"),
+        (None, None) => (sample.time_s, "a finite time"),
+    };
+    let what = format!("{} of {}", quantity.name(), source.name);
+    EstimateError::BadNumber { what, time_s: sample.time_s, value, expected }
 }

@@ -16,7 +16,7 @@
 
 use nalgebra::DVector;
 
-use super::EstimateError;
+use super::{EstimateError, check};
 use crate::estimate::spline::Coefficients;
 use crate::math::chebyshev;
 use crate::math::least_squares::{LeastSquares, Solution};
@@ -64,7 +64,8 @@ struct Row {
 /// Fits a polynomial of `order` to all samples of `sources` within `[from_s, to_s]`.
 ///
 /// # Errors
-/// [`EstimateError::TooFewSamples`] where there are not more rows than unknowns,
+/// [`EstimateError::BadNumber`] as [`check`]; [`EstimateError::TooFewSamples`] where there are not more rows
+/// than unknowns,
 /// [`EstimateError::Undetermined`] where they lie at too few instants or hold no position.
 ///
 /// # Panics
@@ -79,6 +80,7 @@ pub fn fit(
 ) -> Result<Polynomial, EstimateError> {
     assert!((1..=MAX_ORDER).contains(&order));
     let sources: Vec<Source> = sources.iter().map(|s| s.within(from_s, to_s)).collect();
+    check(&sources)?;
     let polynomial =
         Scale { order, middle_s: from_s.midpoint(to_s), half_s: (0.5 * (to_s - from_s)).max(1e-9) };
     let first = sources.iter().flat_map(|s| &s.positions).next();

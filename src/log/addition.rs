@@ -1,5 +1,7 @@
 //! What is added to a log: channels, messages, metadata, and how they are packed.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::{
     collections::BTreeMap,
     io::{self, Write},
@@ -58,7 +60,8 @@ pub struct NewMetadata {
 }
 
 /// How new chunks are compressed; old ones stay as they are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
 pub enum Compression {
     /// Small, and fast to read.
     #[default]

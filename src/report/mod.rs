@@ -12,6 +12,7 @@ use crate::fusion::{Fusion, Plan};
 use crate::sample::Quantity;
 use crate::source::{Candidate, Loaded};
 use crate::time::Time;
+use crate::track::Phase;
 
 /// The report of `fuse`. Nanoseconds are strings, since JSON numbers lose them.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -115,10 +116,12 @@ pub struct PhaseReport {
     pub position_rmse_m: Option<f64>,
     /// The same of the velocities, m/s.
     pub velocity_rmse_m_s: Option<f64>,
-    /// Root mean square 3-D standard deviation of the track's positions, m.
-    pub position_sigma_m: f64,
+    /// Number of separate stretches that this is the sum of.
+    pub stretches: usize,
+    /// Root mean square 3-D standard deviation of the track's positions, m; null where nobody knows it.
+    pub position_sigma_m: Option<f64>,
     /// The same of the velocities, m/s.
-    pub velocity_sigma_m_s: f64,
+    pub velocity_sigma_m_s: Option<f64>,
 }
 
 /// A difference between two sources where both see.
@@ -164,8 +167,10 @@ pub struct ExtrapolationReport {
     pub prior: bool,
     /// Length of the stretch that it was fitted to, s.
     pub window_s: f64,
-    /// How far it goes, s.
+    /// How far it was to go, s.
     pub horizon_s: f64,
+    /// How far it went: less where it reached the height at which it stops, s.
+    pub length_s: f64,
     /// Root mean square 3-D position error of the same extrapolation from earlier instants, m.
     pub holdout_position_m: f64,
     /// The same of the velocity, m/s.
@@ -191,8 +196,8 @@ pub struct EventReport {
     pub position_m: [f64; 3],
     /// Velocity, m/s.
     pub velocity_m_s: [f64; 3],
-    /// Its standard deviation, m/s.
-    pub velocity_sigma_m_s: [f64; 3],
+    /// Its standard deviation, m/s; null where nobody knows it.
+    pub velocity_sigma_m_s: Option<[f64; 3]>,
     /// `single`, `overlap`, `bridged` or `extrapolated`.
     pub phase: String,
 }
@@ -227,8 +232,11 @@ impl Report {
         let Parts { input, output, t0, loaded, datum, unused, plan, fusion, warnings } = *parts;
         let since_t0 = |s: f64| plan.origin.plus_seconds(s).seconds_since(t0);
         let span = |(a, b): (f64, f64)| (since_t0(a), since_t0(b));
+        let known = |sigma: f64| Some(sigma).filter(|s| s.is_finite());
         let name = |i: usize| loaded[i].source.name.clone();
         let points = &fusion.track.points;
+        let carried = fusion.phases.iter().find(|p| p.phase == Phase::Extrapolated);
+        let carried_s = carried.map_or(0.0, |p| p.span_s.1 - fusion.pieces.last().map_or(0.0, |p| p.1));
         let end = |p: Option<&crate::track::TrackPoint>| p.map_or(0.0, |p| p.time.seconds_since(t0));
         Self {
             version: env!("CARGO_PKG_VERSION").into(),
@@ -260,8 +268,9 @@ impl Report {
                     points: p.points,
                     position_rmse_m: p.rmse[Quantity::Position as usize],
                     velocity_rmse_m_s: p.rmse[Quantity::Velocity as usize],
-                    position_sigma_m: p.sigma[Quantity::Position as usize],
-                    velocity_sigma_m_s: p.sigma[Quantity::Velocity as usize],
+                    stretches: p.stretches,
+                    position_sigma_m: known(p.sigma[Quantity::Position as usize]),
+                    velocity_sigma_m_s: known(p.sigma[Quantity::Velocity as usize]),
                 })
                 .collect(),
             disagreements: fusion
@@ -289,6 +298,7 @@ impl Report {
                 prior: s.prior.is_some(),
                 window_s: s.window_s,
                 horizon_s: s.horizon_s,
+                length_s: carried_s,
                 holdout_position_m: h.position_m,
                 holdout_velocity_m_s: h.velocity_m_s,
                 holdout_lead_s: h.lead_s,
@@ -304,7 +314,8 @@ impl Report {
                     time_sigma_s: e.time_sigma_s,
                     position_m: e.state.position,
                     velocity_m_s: e.state.velocity,
-                    velocity_sigma_m_s: e.state.velocity_sigma,
+                    velocity_sigma_m_s: Some(e.state.velocity_sigma)
+                        .filter(|v| v.iter().all(|s| s.is_finite())),
                     phase: e.phase.name().into(),
                 })
                 .collect(),

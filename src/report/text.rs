@@ -45,9 +45,14 @@ fn write_page(out: &mut String, report: &Report) -> fmt::Result {
     if let Some(e) = &report.extrapolation {
         writeln!(
             out,
-            "        carried on {} s by {} of order {}{}, fitted to the last {:.2} s; {} trials {:.2} s ahead: \
+            "        carried on {:.2} s{} by {} of order {}{}, fitted to the last {:.2} s; {} trials {:.2} s ahead: \
              {:.2} m, {:.2} m/s off",
-            short(e.horizon_s),
+            e.length_s,
+            if e.length_s + 1.5 / track.rate_hz < e.horizon_s {
+                " (to the height where it stops)"
+            } else {
+                ""
+            },
             e.method.to_uppercase(),
             e.order,
             if e.prior { " with a prior on jerk and snap" } else { "" },
@@ -132,7 +137,9 @@ fn phases(out: &mut String, report: &Report) -> fmt::Result {
         } else {
             format!("{}: {}", phase.phase, printable(&phase.sources.join(" + ")))
         };
+        let name = if phase.stretches > 1 { format!("{name} ({} parts)", phase.stretches) } else { name };
         let span = format!("{:.2} .. {:.2}", phase.span_s.0, phase.span_s.1);
+        let sigma = |v: Option<f64>, unit: &str| v.map_or("unknown".into(), |v| format!("{v:.3} {unit}"));
         let rmse = |v: Option<f64>, unit: &str| v.map_or("-".into(), |v| format!("{v:.3} {unit}"));
         let rmse = match (phase.position_rmse_m, phase.velocity_rmse_m_s) {
             (None, None) => "-".to_owned(),
@@ -140,8 +147,10 @@ fn phases(out: &mut String, report: &Report) -> fmt::Result {
         };
         writeln!(
             out,
-            "{name:<34} {span:>17} {:>8}   {rmse:<21} {:.3} m, {:.3} m/s",
-            phase.points, phase.position_sigma_m, phase.velocity_sigma_m_s
+            "{name:<34} {span:>17} {:>8}   {rmse:<21} {}, {}",
+            phase.points,
+            sigma(phase.position_sigma_m, "m"),
+            sigma(phase.velocity_sigma_m_s, "m/s")
         )?;
     }
     Ok(())
@@ -156,8 +165,9 @@ fn events(out: &mut String, report: &Report) -> fmt::Result {
     for event in &report.characteristic_points {
         let time = event
             .time_sigma_s
-            .map_or(format!("{:.3}", event.time_s), |s| format!("{:.3} ± {s:.3}", event.time_s));
-        let speed = format!("{:.2} ± {:.2}", event.velocity_m_s[2], event.velocity_sigma_m_s[2]);
+            .map_or(format!("{:.3} ± ?", event.time_s), |s| format!("{:.3} ± {s:.3}", event.time_s));
+        let sigma = event.velocity_sigma_m_s.map_or("?".into(), |s| format!("{:.2}", s[2]));
+        let speed = format!("{:.2} ± {sigma}", event.velocity_m_s[2]);
         writeln!(
             out,
             "{:<34} {time:>20} {:>12.2} {speed:>24}   {}",

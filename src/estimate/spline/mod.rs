@@ -35,14 +35,18 @@ pub use normal::Smoothing;
 
 use normal::{Block, Problem, solve};
 
-use super::EstimateError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{EstimateError, check};
 use crate::math::gaussian_basis::{Active, GaussianBasis};
 use crate::math::simd::{Kernel, vectorised};
 use crate::sample::{Quantity, Sample, Source};
 use crate::track::{Curve, State};
 
 /// Whether the velocity is the derivative of the position.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
 pub enum Coefficients {
     /// p = q: it is.
     #[default]
@@ -163,35 +167,6 @@ pub fn fit(sources: &[Source], from_s: f64, to_s: f64, settings: &Settings) -> R
     });
     let parts = parts.collect::<Result<_, EstimateError>>()?;
     Ok(Spline { basis, centre, from_s, to_s, parts })
-}
-
-fn check(sources: &[Source]) -> Result<(), EstimateError> {
-    for source in sources {
-        for quantity in Quantity::ALL {
-            let good = |s: &Sample| {
-                // a sum is finite only where all of its terms are
-                let sum: f64 = s.value.iter().chain(&s.sigma).sum::<f64>() + s.time_s;
-                sum.is_finite() && s.sigma.iter().all(|v| *v > 0.0)
-            };
-            if let Some(sample) = source.series(quantity).iter().find(|s| !good(s)) {
-                return Err(bad_number(source, quantity, sample));
-            }
-        }
-    }
-    Ok(())
-}
-
-/// What is wrong with a sample that [`check`] found.
-fn bad_number(source: &Source, quantity: Quantity, sample: &Sample) -> EstimateError {
-    let value = sample.value.iter().find(|v| !v.is_finite());
-    let sigma = sample.sigma.iter().find(|v| !(**v > 0.0 && v.is_finite()));
-    let (value, expected) = match (value, sigma) {
-        (Some(&v), _) => (v, "a finite number"),
-        (None, Some(&v)) => (v, "a positive sigma"),
-        (None, None) => (sample.time_s, "a finite time"),
-    };
-    let what = format!("{} of {}", quantity.name(), source.name);
-    EstimateError::BadNumber { what, time_s: sample.time_s, value, expected }
 }
 
 /// The middle of the positions' range: coefficients about it are small, and so are rounding and ripple.

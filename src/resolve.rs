@@ -1,0 +1,209 @@
+//! From what was asked to what is done: every default resolved for the sources at hand.
+
+use std::collections::BTreeMap;
+
+use crate::config::{Config, Registration};
+use crate::estimate::characteristic_point::Height;
+use crate::estimate::polynomial::Prior;
+use crate::estimate::{coverage, extrapolation};
+use crate::fusion::{self, Fusion, Plan};
+use crate::sample::Source;
+use crate::source::Loaded;
+use crate::time::Time;
+
+/// Why what was asked can't be done.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ResolveError {
+    /// The track would have more points than anyone can read.
+    #[error(
+        "output.rate_hz is {rate_hz}, which makes {points:.0} points over {span_s:.0} s with the extrapolation, expected \
+         at most {most:.0}"
+    )]
+    TooManyPoints {
+        /// The rate that was asked for, Hz.
+        rate_hz: f64,
+        /// How long the track is, s.
+        span_s: f64,
+        /// How many points that makes.
+        points: f64,
+        /// How many there may be.
+        most: f64,
+    },
+    /// Two sources' clocks count from different epochs.
+    #[error(
+        "{first}'s and {second}'s clocks are of different epochs, {apart_s:.0} s apart, expected one clock"
+    )]
+    Epochs {
+        /// The datum.
+        first: String,
+        /// The other source.
+        second: String,
+        /// How far their clocks are apart, s.
+        apart_s: f64,
+    },
+}
+
+impl ResolveError {
+    /// What to do about it.
+    #[must_use]
+    pub fn hint(&self) -> String {
+        match self {
+            Self::TooManyPoints { .. } => "lower `output.rate_hz` or `extrapolation.horizon_s`".into(),
+            Self::Epochs { .. } => "set `time = \"log\"` for both sources".into(),
+        }
+    }
+}
+
+/// What is to be done for these sources; what was resolved goes back into the config, which so makes the
+/// track again.
+///
+/// # Errors
+/// [`ResolveError::TooManyPoints`] for a rate that makes a track nobody can read,
+/// [`ResolveError::Epochs`] for sources whose clocks can't be put on one time line.
+pub fn plan(
+    config: &mut Config,
+    loaded: &[Loaded],
+    sources: &[Source],
+    datum: usize,
+    origin: Time,
+    warnings: &mut Vec<String>,
+) -> Result<Plan, ResolveError> {
+    check_epochs(loaded, datum)?;
+    let rate_hz = rate_hz(config, sources, warnings)?;
+    let Config { output, fusion: fuse, extrapolation: beyond, .. } = config;
+    output.rate_hz = Some(rate_hz);
+    let frame_id = output.frame_id.get_or_insert_with(|| loaded[datum].frame_id.clone()).clone();
+    output.surface_at_zero.get_or_insert_with(|| surface_at_zero(sources));
+    fuse.estimate = Registration::List(Vec::new()); // all that can be estimated today
+    let window_s = *beyond.window_s.get_or_insert_with(|| default_window_s(sources));
+    Ok(Plan {
+        origin,
+        frame_id,
+        rate_hz,
+        datum,
+        method: fuse.method,
+        coefficients: fuse.coefficients,
+        knot_spacing_s: fuse.knot_spacing_s,
+        order: fuse.order,
+        window_points: fuse.window_points,
+        bridge_max_s: fuse.bridge_max_s,
+        extrapolation: (beyond.horizon_s > 0.0).then(|| extrapolation::Settings {
+            order: beyond.order,
+            window_s,
+            prior: beyond.prior.then_some(Prior { sigma: PRIOR_SIGMA }),
+            horizon_s: beyond.horizon_s,
+        }),
+        stop_z_m: beyond.stop_z_m,
+        heights: config
+            .characteristic_point
+            .iter()
+            .map(|p| Height { name: p.name.clone(), z_m: p.z_m })
+            .collect(),
+    })
+}
+
+/// Most points of a track: 14 h at 100 Hz, 3 GB of messages.
+const MAX_POINTS: f64 = 5e6;
+
+/// Most points for each sample, where the rate is not the user's: samples in bursts have a short median
+/// interval that says nothing of the log.
+const MAX_POINTS_PER_SAMPLE: f64 = 100.0;
+
+/// Points a second, such that the track stays of a size that can be read.
+fn rate_hz(config: &Config, sources: &[Source], warnings: &mut Vec<String>) -> Result<f64, ResolveError> {
+    let pieces = coverage::Coverage::of(sources).pieces(config.fusion.bridge_max_s);
+    let seen_s: f64 = pieces.iter().map(|p| p.1 - p.0).sum();
+    let span_s = seen_s + config.extrapolation.horizon_s;
+    if let Some(rate_hz) = config.output.rate_hz {
+        let points = rate_hz * span_s;
+        return if points <= MAX_POINTS {
+            Ok(rate_hz)
+        } else {
+            Err(ResolveError::TooManyPoints { rate_hz, span_s, points, most: MAX_POINTS })
+        };
+    }
+    let rate_hz = fusion::fastest_rate_hz(sources).unwrap_or(1.0);
+    let samples: usize = sources.iter().map(Source::len).sum();
+    let for_samples = 1000.0 + MAX_POINTS_PER_SAMPLE * samples as f64;
+    let lowered = rate_hz.min(for_samples / seen_s).min(MAX_POINTS / span_s);
+    if lowered == rate_hz {
+        return Ok(rate_hz);
+    }
+    warnings.push(format!(
+        "the median interval of the fastest source asks for {rate_hz:.2} points a second over {span_s:.0} s: lowered \
+         to {lowered:.2}; set `output.rate_hz` for another rate"
+    ));
+    Ok(lowered)
+}
+
+/// Standard deviation of jerk, m/s^3, and snap, m/s^4, in the extrapolation's prior: the best of several on
+/// simulated steep climbs.
+const PRIOR_SIGMA: f64 = 0.5;
+
+/// 1.4 s, the best of several on simulated steep climbs, or 12 median intervals of the slowest source.
+fn default_window_s(sources: &[Source]) -> f64 {
+    let slowest = sources.iter().filter_map(coverage::median_interval_s).fold(0.0, f64::max);
+    f64::max(1.4, 12.0 * slowest)
+}
+
+/// The datum's first sample that is in the track, which a stray stamp is not: T0.
+#[must_use]
+pub fn first_sample(datum: &Source, fusion: &Fusion, origin: Time) -> Time {
+    let inside = |t: f64| fusion.pieces.iter().any(|p| (p.0..=p.1).contains(&t));
+    let times = datum.positions.iter().chain(&datum.velocities).map(|s| s.time_s).filter(|&t| inside(t));
+    let first = times.fold(f64::INFINITY, f64::min);
+    let start = fusion.pieces.first().map_or(0.0, |p| p.0);
+    origin.plus_seconds(if first.is_finite() { first } else { start })
+}
+
+/// Clocks that differ by more than this count from different epochs.
+const DIFFERENT_EPOCHS_S: f64 = 3600.0;
+
+/// Seconds between the datum's clock and the log's, where they are clocks of different epochs.
+#[must_use]
+pub fn log_time_shift_s(datum: &Loaded) -> Option<f64> {
+    Some(datum.timing.delay_s).filter(|d| d.abs() > DIFFERENT_EPOCHS_S)
+}
+
+/// Whether the data look as if z = 0 were the surface.
+fn surface_at_zero(sources: &[Source]) -> bool {
+    let heights = || sources.iter().flat_map(|s| &s.positions).map(|p| p.value[2]);
+    heights().all(|z| z < 2.0) && heights().any(|z| z < -2.0)
+}
+
+/// An error where a source's clock is of another epoch than the datum's: no track can hold both.
+fn check_epochs(loaded: &[Loaded], datum: usize) -> Result<(), ResolveError> {
+    let of_datum = &loaded[datum];
+    let apart_s = |other: &Loaded| (other.timing.delay_s - of_datum.timing.delay_s).abs();
+    match loaded.iter().find(|l| apart_s(l) > DIFFERENT_EPOCHS_S) {
+        Some(other) => Err(ResolveError::Epochs {
+            first: of_datum.source.name.clone(),
+            second: other.source.name.clone(),
+            apart_s: apart_s(other),
+        }),
+        None => Ok(()),
+    }
+}
+
+/// What a person must read of the sources' own troubles, frames and clocks.
+#[must_use]
+pub fn warnings_of(loaded: &[Loaded], shift_s: Option<f64>) -> Vec<String> {
+    let mut warnings: Vec<String> = loaded.iter().flat_map(|l| l.warnings.clone()).collect();
+    let frames: BTreeMap<&str, &str> = loaded
+        .iter()
+        .filter(|l| !l.frame_id.is_empty())
+        .map(|l| (l.frame_id.as_str(), l.source.name.as_str()))
+        .collect();
+    if frames.len() > 1 {
+        let list: Vec<String> = frames.iter().map(|(frame, name)| format!("{name} in {frame:?}")).collect();
+        warnings
+            .push(format!("the sources name different frames ({}): they are taken as one", list.join(", ")));
+    }
+    if let Some(shift) = shift_s {
+        warnings.push(format!(
+            "the datum's stamps and the log's times are of different epochs: new messages keep the stamps in \
+             `timestamp`, and their log times are {shift:.3} s later"
+        ));
+    }
+    warnings
+}

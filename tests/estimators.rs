@@ -1,0 +1,207 @@
+//! What every estimator must keep, whatever its method.
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use trackfuse::estimate::EstimateError;
+use trackfuse::estimate::extrapolation;
+use trackfuse::estimate::polynomial::Prior;
+use trackfuse::estimate::spline::Coefficients;
+use trackfuse::fusion::{Fusion, Plan, fuse};
+use trackfuse::sample::{Quantity, Sample, Source};
+use trackfuse::time::Time;
+use trackfuse::track::{Method, TrackPoint};
+
+const METHODS: [Method; 4] =
+    [Method::WeightedMean, Method::Polynomial, Method::Spline, Method::MovingAverage];
+
+fn plan(method: Method, coefficients: Coefficients) -> Plan {
+    Plan {
+        origin: Time::from_ns(1_700_000_000_000_000_000),
+        frame_id: "enu".into(),
+        rate_hz: 50.0,
+        datum: 0,
+        method,
+        coefficients,
+        knot_spacing_s: None,
+        order: 8,
+        window_points: 5,
+        bridge_max_s: 5.0,
+        extrapolation: Some(extrapolation::Settings {
+            order: 4,
+            window_s: 1.4,
+            prior: Some(Prior { sigma: 0.5 }),
+            horizon_s: 0.5,
+        }),
+        stop_z_m: None,
+        heights: Vec::new(),
+    }
+}
+
+/// Two sources of one motion at times of their own, with an overlap.
+fn sources(noise: f64) -> Vec<Source> {
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let mut make = |name: &str, from: f64, to: f64, step: f64| {
+        let mut source = Source { name: name.into(), ..Source::default() };
+        for i in 0..((to - from) / step) as usize {
+            let t = from + i as f64 * step;
+            let (position, velocity) = ([2.0 * t, 0.3 * t * t, -60.0 + 8.0 * t], [2.0, 0.6 * t, 8.0]);
+            let mut sample = |value: [f64; 3]| {
+                let value = value.map(|v| {
+                    let n: f64 = StandardNormal.sample(&mut rng);
+                    v + noise * n
+                });
+                Sample { time_s: t, value, sigma: [0.1; 3] }
+            };
+            source.positions.push(sample(position));
+            source.velocities.push(sample(velocity));
+        }
+        source
+    };
+    vec![make("tether", 0.0, 2.2, 0.02), make("beacon", 1.6, 4.0, 0.043)]
+}
+
+fn run(sources: &[Source], method: Method, coefficients: Coefficients) -> Fusion {
+    fuse(sources, &plan(method, coefficients)).expect("a good problem")
+}
+
+fn each(mut check: impl FnMut(Method, Coefficients)) {
+    for method in METHODS {
+        for coefficients in [Coefficients::Shared, Coefficients::Independent] {
+            check(method, coefficients);
+        }
+    }
+}
+
+fn changed(sources: &[Source], mut change: impl FnMut(&mut Sample)) -> Vec<Source> {
+    let mut sources = sources.to_vec();
+    for source in &mut sources {
+        for quantity in Quantity::ALL {
+            source.series_mut(quantity).iter_mut().for_each(&mut change);
+        }
+    }
+    sources
+}
+
+fn assert_close(a: [f64; 3], b: [f64; 3], tolerance: f64, what: &str) {
+    let distance = (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt();
+    assert!(distance < tolerance, "{what}: {a:?} against {b:?}");
+}
+
+fn assert_same_points(a: &[TrackPoint], b: &[TrackPoint], turn: impl Fn([f64; 3]) -> [f64; 3], what: &str) {
+    assert_eq!(a.len(), b.len(), "{what}");
+    for (a, b) in a.iter().zip(b) {
+        assert_close(turn(a.state.position), b.state.position, 1e-6, what);
+        assert_close(turn(a.state.velocity), b.state.velocity, 1e-5, what);
+        assert_eq!((a.phase, a.seen_by), (b.phase, b.seen_by), "{what}");
+    }
+}
+
+#[test]
+fn noise_free_data_of_a_parabola_are_met_exactly_but_for_interpolation_and_averaging() {
+    each(|method, coefficients| {
+        let found = run(&sources(0.0), method, coefficients);
+        // straight lines between samples 43 ms apart, and 5 points of a parabola
+        let tolerance = match method {
+            Method::Polynomial => 1e-7,
+            Method::Spline => 1e-5,
+            Method::WeightedMean | Method::MovingAverage => 5e-2,
+        };
+        for point in found.track.points {
+            let t = point.time.seconds_since(Time::from_ns(1_700_000_000_000_000_000));
+            let truth = [2.0 * t, 0.3 * t * t, -60.0 + 8.0 * t];
+            // a moving average is cut off, and so leans inwards, at the ends
+            if method != Method::MovingAverage || (0.05..3.9).contains(&t) {
+                assert_close(point.state.position, truth, tolerance, &format!("{method:?} at {t}"));
+            }
+        }
+    });
+}
+
+#[test]
+fn a_shift_of_all_times_shifts_the_track() {
+    let original = sources(0.1);
+    // a power of two, so that the shifted times are exact
+    let shifted = changed(&original, |s| s.time_s += 1024.0);
+    each(|method, coefficients| {
+        let (a, b) = (run(&original, method, coefficients), run(&shifted, method, coefficients));
+        assert_same_points(&a.track.points, &b.track.points, |v| v, &format!("{method:?} {coefficients:?}"));
+    });
+}
+
+#[test]
+fn turned_sources_give_the_turned_track() {
+    let (sine, cosine) = 0.7_f64.sin_cos();
+    let turn = |v: [f64; 3]| [cosine * v[0] - sine * v[1], sine * v[0] + cosine * v[1], v[2]];
+    let original = sources(0.1);
+    let turned = changed(&original, |s| s.value = turn(s.value));
+    each(|method, coefficients| {
+        let (a, b) = (run(&original, method, coefficients), run(&turned, method, coefficients));
+        let what = format!("{method:?} {coefficients:?}");
+        assert_eq!(a.track.points.len(), b.track.points.len(), "{what}");
+        for (a, b) in a.track.points.iter().zip(&b.track.points) {
+            // the penalty's weight is found to a twentieth of a decade: turned data may end elsewhere within it
+            let tolerance = if method == Method::Spline { 5e-3 } else { 1e-6 };
+            assert_close(turn(a.state.position), b.state.position, tolerance, &what);
+        }
+    });
+}
+
+#[test]
+fn the_order_of_samples_of_one_instant_does_not_matter() {
+    let mut doubled = sources(0.1);
+    for source in &mut doubled {
+        for quantity in Quantity::ALL {
+            let series = source.series_mut(quantity);
+            for pair in series.chunks_exact_mut(2) {
+                pair[1].time_s = pair[0].time_s;
+            }
+        }
+    }
+    let mut swapped = doubled.clone();
+    for source in &mut swapped {
+        for quantity in Quantity::ALL {
+            source.series_mut(quantity).chunks_exact_mut(2).for_each(|pair| pair.swap(0, 1));
+        }
+    }
+    // the weighted mean takes one of two samples of an instant, by their order
+    for method in [Method::Spline, Method::Polynomial] {
+        let (a, b) =
+            (run(&doubled, method, Coefficients::Shared), run(&swapped, method, Coefficients::Shared));
+        assert_same_points(&a.track.points, &b.track.points, |v| v, &format!("{method:?}"));
+    }
+}
+
+#[test]
+fn numbers_that_are_no_numbers_are_refused_by_name() {
+    each(|method, coefficients| {
+        for (bad, expected) in [(0, "a finite number"), (1, "a positive sigma"), (2, "a finite time")] {
+            let mut soiled = sources(0.1);
+            let sample = &mut soiled[1].velocities[7];
+            match bad {
+                0 => sample.value[1] = f64::NAN,
+                1 => sample.sigma[2] = 0.0,
+                _ => sample.time_s = f64::INFINITY,
+            }
+            let error = fuse(&soiled, &plan(method, coefficients)).expect_err("a bad number");
+            let EstimateError::BadNumber { what, expected: wanted, .. } = error else {
+                panic!("{method:?}: {error}");
+            };
+            assert_eq!((what.as_str(), wanted), ("velocity of beacon", expected));
+        }
+    });
+}
+
+#[test]
+fn sigmas_are_positive_and_grow_after_the_last_sample() {
+    each(|method, coefficients| {
+        let found = run(&sources(0.1), method, coefficients);
+        for point in &found.track.points {
+            let sigmas = point.state.position_sigma.iter().chain(&point.state.velocity_sigma);
+            assert!(sigmas.into_iter().all(|s| s.is_finite() && *s > 0.0), "{method:?}: {point:?}");
+        }
+        let beyond: Vec<f64> =
+            found.track.points.iter().filter(|p| p.seen_by == 0).map(|p| p.state.position_sigma[2]).collect();
+        assert!(beyond.len() > 20 && beyond.windows(2).all(|w| w[0] < w[1]), "{method:?}: {beyond:?}");
+    });
+}
