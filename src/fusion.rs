@@ -7,13 +7,14 @@
 //! 4. The last piece is carried on ([`extrapolation`]), and once more the paper's plain way.
 //! 5. Characteristic points are looked up on the track.
 
+use crate::estimate::Coefficients;
 use crate::estimate::agreement::{self, Disagreement};
 use crate::estimate::characteristic_point::{self, CharacteristicPoint, Height};
 use crate::estimate::coverage::{self, Coverage};
 use crate::estimate::extrapolation::{self, Holdout};
 use crate::estimate::moving_average::MovingAverage;
 use crate::estimate::polynomial;
-use crate::estimate::spline::{self, Coefficients};
+use crate::estimate::spline;
 use crate::estimate::weighted_mean::WeightedMean;
 use crate::estimate::{self, EstimateError};
 use crate::quality::{self, PhaseSummary};
@@ -115,8 +116,19 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
     warn_of_misfit(&pieces, &disagreements, &mut warnings);
 
     let mut points = Vec::new();
+    let mut last_s = 0.0;
     for piece in &pieces {
-        points.extend(observed(piece, &coverage, &bands, plan));
+        let seen = observed(piece, &coverage, &bands, plan);
+        if seen.is_empty() {
+            warnings.push(format!(
+                "{} gives no point between {:.2} s and {:.2} s after the origin: no source has a position there",
+                plan.method.name(),
+                piece.from_s,
+                piece.to_s
+            ));
+        }
+        last_s = seen.last().map_or(piece.to_s, |p| p.time.seconds_since(plan.origin));
+        points.extend(seen);
     }
     let (mut plain, mut holdout) = (Vec::new(), None);
     if let Some((piece, settings)) = pieces.last().zip(plan.extrapolation) {
@@ -128,15 +140,14 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
             ));
         }
         let last = seeing_the_end(piece, &coverage);
-        let start_s = points.last().map_or(piece.to_s, |p: &TrackPoint| p.time.seconds_since(plan.origin));
         let as_printed = extrapolation::Settings {
             order: PLAIN_PCF.0,
             window_s: last_samples_s(&last, piece.to_s, PLAIN_PCF.1),
             prior: None,
             ..settings
         };
-        plain = carry_on(piece, &last, &as_printed, start_s, &bands, plan).map_or(Vec::new(), |made| made.0);
-        match carry_on(piece, &last, &settings, start_s, &bands, plan) {
+        plain = carry_on(piece, &last, &as_printed, last_s, &bands, plan).map_or(Vec::new(), |made| made.0);
+        match carry_on(piece, &last, &settings, last_s, &bands, plan) {
             Ok((carried, found)) => {
                 points.extend(carried);
                 holdout = Some(found);
@@ -224,7 +235,7 @@ fn observed(piece: &Piece, coverage: &Coverage, bands: &Bands, plan: &Plan) -> V
     };
     let mut points: Vec<TrackPoint> =
         grid(piece.from_s, piece.to_s, plan.rate_hz).filter_map(point).collect();
-    difference_velocities(&mut points);
+    difference_velocities(&mut points, 1.5 / plan.rate_hz);
     points
 }
 
@@ -248,7 +259,13 @@ fn carry_on(
             seen_by: 0,
         })
     };
-    let below = |p: &TrackPoint| plan.stop_z_m.is_none_or(|stop| p.state.position[2] <= stop);
+    // up to the first point at or above the stop, so that a height at the stop is reached
+    let mut above = false;
+    let below = |p: &TrackPoint| {
+        let go_on = !above;
+        above = plan.stop_z_m.is_some_and(|stop| p.state.position[2] >= stop);
+        go_on
+    };
     let times = grid(start_s, piece.to_s + settings.horizon_s, plan.rate_hz).filter(|&t| t > piece.to_s);
     Ok((times.map_while(point).take_while(below).collect(), made.holdout))
 }
@@ -326,7 +343,7 @@ fn fit_pieces(
 type Fitted = (Box<dyn Curve>, Option<SplineSummary>);
 
 fn fit(sources: &[Source], from_s: f64, to_s: f64, plan: &Plan) -> Result<Fitted, EstimateError> {
-    let got: usize = sources.iter().map(Source::len).sum();
+    let got = instants(sources);
     if got < spline::MIN_SAMPLES {
         let what = plan.method.name().to_owned();
         return Err(EstimateError::TooFewSamples { what, needed: spline::MIN_SAMPLES, got });
@@ -334,7 +351,7 @@ fn fit(sources: &[Source], from_s: f64, to_s: f64, plan: &Plan) -> Result<Fitted
     match plan.method {
         Method::Spline => {
             let settings = spline::Settings {
-                knot_spacing_s: plan.knot_spacing_s.map(|s| bounded_spacing(s, got, from_s, to_s)),
+                knot_spacing_s: plan.knot_spacing_s,
                 coefficients: plan.coefficients,
                 ..spline::Settings::default()
             };
@@ -360,9 +377,24 @@ fn fit(sources: &[Source], from_s: f64, to_s: f64, plan: &Plan) -> Result<Fitted
     }
 }
 
-/// No more knots than samples, whatever spacing was asked for.
-fn bounded_spacing(spacing_s: f64, samples: usize, from_s: f64, to_s: f64) -> f64 {
-    spacing_s.max((to_s - from_s) / samples as f64)
+/// Number of different sampling instants, counted up to [`spline::MIN_SAMPLES`] of each series.
+fn instants(sources: &[Source]) -> usize {
+    let mut times: Vec<f64> = Vec::new();
+    for series in sources.iter().flat_map(|s| Quantity::ALL.map(|q| s.series(q))) {
+        let mut own: Vec<f64> = Vec::new();
+        for sample in series {
+            if own.last() != Some(&sample.time_s) {
+                own.push(sample.time_s);
+            }
+            if own.len() == spline::MIN_SAMPLES {
+                break;
+            }
+        }
+        times.extend(own);
+    }
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    times.len()
 }
 
 /// Instants from `from_s` on, `1 / rate_hz` apart, up to `to_s`.
@@ -376,20 +408,27 @@ fn last_samples_s(sources: &[Source], to_s: f64, count: usize) -> f64 {
     let mut times: Vec<f64> = sources.iter().flat_map(|s| &s.positions).map(|p| p.time_s).collect();
     times.sort_by(f64::total_cmp);
     let first = times.len().saturating_sub(count);
-    times.get(first).map_or(0.0, |t| to_s - t)
+    times.get(first).map_or(0.0, |t| to_s - t + 1e-9) // so that rounding doesn't lose the first
 }
 
-/// Gives points without an acceleration the difference of their neighbours' velocities, as the paper does.
-fn difference_velocities(points: &mut [TrackPoint]) {
-    let slopes: Vec<[f64; 3]> = (0..points.len())
-        .map(|i| {
-            let (a, b) = (&points[i.saturating_sub(1)], &points[(i + 1).min(points.len() - 1)]);
-            let dt = b.time.seconds_since(a.time).max(1e-9);
-            std::array::from_fn(|axis| (b.state.velocity[axis] - a.state.velocity[axis]) / dt)
-        })
-        .collect();
+/// Gives points without an acceleration the difference of their neighbours' velocities, as the paper does; none
+/// to a point without neighbours within `max_step_s`.
+fn difference_velocities(points: &mut [TrackPoint], max_step_s: f64) {
+    let slope = |i: usize| {
+        let near = |j: usize| {
+            let neighbour = points.get(j)?;
+            let step_s = neighbour.time.seconds_since(points[i].time).abs();
+            (step_s <= max_step_s).then_some(neighbour)
+        };
+        let (a, b) =
+            (i.checked_sub(1).and_then(near).unwrap_or(&points[i]), near(i + 1).unwrap_or(&points[i]));
+        let dt = b.time.seconds_since(a.time);
+        let difference = |axis| (b.state.velocity[axis] - a.state.velocity[axis]) / dt;
+        (dt > 0.0).then(|| std::array::from_fn(difference))
+    };
+    let slopes: Vec<Option<[f64; 3]>> = (0..points.len()).map(slope).collect();
     for (point, slope) in points.iter_mut().zip(slopes) {
-        point.state.acceleration.get_or_insert(slope);
+        point.state.acceleration = point.state.acceleration.or(slope);
     }
 }
 

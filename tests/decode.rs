@@ -12,7 +12,9 @@ use trackfuse::log::decode::{Decoder, MessagePath, Value};
 fn test_data() -> Option<PathBuf> {
     let dir = std::env::var_os("TRACKFUSE_TEST_DATA").map(PathBuf::from);
     if dir.is_none() {
-        println!("skipped: TRACKFUSE_TEST_DATA is not set");
+        // past the test runner, which would keep it to itself
+        let _ =
+            std::io::Write::write_all(&mut std::io::stderr(), b"skipped: TRACKFUSE_TEST_DATA is not set\n");
     }
     dir
 }

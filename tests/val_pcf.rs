@@ -1,7 +1,7 @@
 //! PCF held against Zhang 2025: how far an order-4 polynomial extrapolates, and how an order-12 one fails.
 
+use trackfuse::estimate::Coefficients;
 use trackfuse::estimate::polynomial;
-use trackfuse::estimate::spline::Coefficients;
 use trackfuse::sample::{Sample, Source};
 use trackfuse::simulate::{Scenario, Simulation, simulate};
 use trackfuse::track::Curve;

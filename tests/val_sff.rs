@@ -5,7 +5,8 @@ use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use trackfuse::estimate::spline::{self, Coefficients, Settings, Smoothing};
+use trackfuse::estimate::Coefficients;
+use trackfuse::estimate::spline::{self, Settings, Smoothing};
 use trackfuse::sample::{Sample, Source};
 use trackfuse::track::Curve;
 

@@ -135,14 +135,23 @@ pub fn explain(error: &CommandError) {
 /// Prints a command's result on stdout, and its warnings on stderr where they would not be seen otherwise:
 /// the text holds them too.
 fn say(voice: Voice, text: &str, json: &impl serde::Serialize, warnings: &[String]) {
-    // a reader that went away is no error of ours
     let mut stdout = io::stdout().lock();
-    let _ = if voice.json {
+    let printed = if voice.json {
         let json = serde_json::to_string_pretty(json).unwrap_or_default();
         writeln!(stdout, "{json}")
     } else {
         write!(stdout, "{text}")
     };
+    match printed.and_then(|()| stdout.flush()) {
+        // a reader that went away wants no more
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            let _ = writeln!(
+                io::stderr(),
+                "warning: the output is written, but its summary can't be printed: {error}"
+            );
+        }
+        _ => {}
+    }
     if !voice.quiet && (voice.json || !stdout.is_terminal()) {
         let mut stderr = io::stderr().lock();
         for warning in warnings {

@@ -52,9 +52,9 @@ pub fn compare(sources: &[Source]) -> Vec<Disagreement> {
                 let (a, b) = (sources[first].series(quantity), sources[second].series(quantity));
                 // the denser one is interpolated
                 let differences = if a.len() >= b.len() {
-                    differences(b, a, coverage.outage_s(first), 1.0)
+                    differences(b, a, coverage.outage_s(first, quantity), 1.0)
                 } else {
-                    differences(a, b, coverage.outage_s(second), -1.0)
+                    differences(a, b, coverage.outage_s(second, quantity), -1.0)
                 };
                 found.extend(summarise(&differences, (first, second), quantity));
             }
@@ -89,6 +89,9 @@ fn summarise(
         let median = robust::median(&mut values)?;
         let spread = robust::sigma_about_zero(&mut deviations(median).collect::<Vec<_>>())?;
         let stated = robust::median(&mut differences.iter().map(|d| d.1[axis]).collect::<Vec<_>>())?;
+        if !(spread.is_finite() && median.is_finite()) {
+            return None;
+        }
         // neighbours that deviate alike count for fewer: n (1 - r) / (1 + r)
         let clipped: Vec<f64> = deviations(median).map(|d| d.clamp(-3.0 * spread, 3.0 * spread)).collect();
         let correlation = lag_one_correlation(&clipped).clamp(0.0, 0.95);

@@ -14,16 +14,20 @@ const OUTAGE_INTERVALS: f64 = 10.0;
 pub struct Coverage {
     /// For each source its runs of samples, `(from, to)` in s, in order.
     runs: Vec<Vec<(f64, f64)>>,
-    /// For each source the longest interval between two of its samples that is no outage, s.
-    outage_s: Vec<f64>,
+    /// For each source the longest interval between two of its samples that is no outage, s: of its positions,
+    /// of its velocities.
+    outage_s: Vec<[f64; 2]>,
 }
 
 /// The median interval between successive distinct times of a source's denser series, s.
 #[must_use]
 pub fn median_interval_s(source: &Source) -> Option<f64> {
-    let denser = Quantity::ALL.map(|q| source.series(q)).into_iter().max_by_key(|s| s.len())?;
+    median_step_s(Quantity::ALL.map(|q| source.series(q)).into_iter().max_by_key(|s| s.len())?)
+}
+
+fn median_step_s(series: &[Sample]) -> Option<f64> {
     let mut steps: Vec<f64> =
-        denser.windows(2).map(|w| w[1].time_s - w[0].time_s).filter(|d| *d > 0.0).collect();
+        series.windows(2).map(|w| w[1].time_s - w[0].time_s).filter(|d| *d > 0.0).collect();
     robust::median(&mut steps)
 }
 
@@ -31,11 +35,11 @@ impl Coverage {
     /// The runs of each source; a longer silence than ten median intervals ends one.
     #[must_use]
     pub fn of(sources: &[Source]) -> Self {
-        let outage_s: Vec<f64> = sources
-            .iter()
-            .map(|s| median_interval_s(s).map_or(0.0, |interval| OUTAGE_INTERVALS * interval))
-            .collect();
-        let runs = sources.iter().zip(&outage_s).map(|(source, &outage)| runs(source, outage)).collect();
+        let of_series = |series: &[Sample]| median_step_s(series).map_or(0.0, |step| OUTAGE_INTERVALS * step);
+        let outage_s: Vec<[f64; 2]> =
+            sources.iter().map(|s| Quantity::ALL.map(|q| of_series(s.series(q)))).collect();
+        let runs =
+            sources.iter().zip(&outage_s).map(|(source, outage)| runs(source, densest(outage))).collect();
         Self { runs, outage_s }
     }
 
@@ -59,10 +63,10 @@ impl Coverage {
         }
     }
 
-    /// The longest interval between two samples of source `index` that is no outage, s.
+    /// The longest interval between two samples of `quantity` of source `index` that is no outage, s.
     #[must_use]
-    pub fn outage_s(&self, index: usize) -> f64 {
-        self.outage_s[index]
+    pub fn outage_s(&self, index: usize, quantity: Quantity) -> f64 {
+        self.outage_s[index][quantity as usize]
     }
 
     /// The runs of source `index`, `(from, to)` in s.
@@ -79,7 +83,7 @@ impl Coverage {
             .runs
             .iter()
             .zip(&self.outage_s)
-            .flat_map(|(runs, &outage)| runs.iter().map(move |&run| (run, outage)))
+            .flat_map(|(runs, outage)| runs.iter().map(move |&run| (run, densest(outage))))
             .collect();
         runs.sort_by(|a, b| a.0.0.total_cmp(&b.0.0));
         let mut pieces: Vec<((f64, f64), f64)> = Vec::new();
@@ -95,6 +99,11 @@ impl Coverage {
         }
         pieces.into_iter().map(|(piece, _)| piece).collect()
     }
+}
+
+/// The limit of the series that is sampled faster.
+fn densest(outage_s: &[f64; 2]) -> f64 {
+    outage_s.iter().copied().filter(|s| *s > 0.0).reduce(f64::min).unwrap_or(0.0)
 }
 
 fn runs(source: &Source, outage_s: f64) -> Vec<(f64, f64)> {

@@ -9,9 +9,9 @@
 //! lead h, beside the fit's own. q is found by maximum likelihood from *rolling origins*: the same
 //! extrapolation from six earlier instants, held against the curve that the later samples gave.
 
+use super::Coefficients;
 use super::EstimateError;
 use super::polynomial::{self, Polynomial, Prior};
-use super::spline::Coefficients;
 use crate::math::scalar;
 use crate::sample::Source;
 use crate::track::{Curve, State};
@@ -41,9 +41,9 @@ pub struct Extrapolation {
     polynomial: Polynomial,
     /// The last sample's time, s.
     pub from_s: f64,
-    /// Density of the acceleration's error by axis, m^2/s^3.
+    /// Density q of the acceleration's error by axis, m^2/s^3.
     pub acceleration_density: [f64; 3],
-    /// Root mean square 3-D position error of the trials, m, and their mean lead, s.
+    /// How the trials from earlier instants did.
     pub holdout: Holdout,
 }
 
@@ -60,7 +60,7 @@ pub struct Holdout {
     pub trials: usize,
 }
 
-/// One error of a trial: lead, fit's variance, squared error, by axis and for position and velocity.
+/// A trial held against the curve at one lead.
 struct Miss {
     lead_s: f64,
     origin: usize,
@@ -185,7 +185,7 @@ mod tests {
         let found = run(source(4.0, |t| (0.5 * t * t, t)), &SETTINGS).expect("long enough");
         let state = found.at(6.0).expect("beyond the end");
         assert!((state.position[0] - 18.0).abs() < 1e-3 && (state.velocity[0] - 6.0).abs() < 1e-3);
-        assert!(state.position_sigma[0] < 0.2, "{}", state.position_sigma[0]);
+        assert!(state.position_sigma[0] < 0.4, "{}", state.position_sigma[0]);
         assert!(found.at(3.9).is_none());
     }
 

@@ -10,7 +10,32 @@ pub mod polynomial;
 pub mod spline;
 pub mod weighted_mean;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::sample::{Quantity, Sample, Source};
+
+/// Whether the velocity is the derivative of the position.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Coefficients {
+    /// p = q: it is.
+    #[default]
+    Shared,
+    /// Position and velocity are fitted apart, as eq. 8 says literally.
+    Independent,
+}
+
+impl Coefficients {
+    /// The reading's name in configs and reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Shared => "shared",
+            Self::Independent => "independent",
+        }
+    }
+}
 
 /// Why an estimator has no answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -47,17 +72,21 @@ pub enum EstimateError {
     },
 }
 
+/// Numbers beyond this overflow when they are squared a few times: no measurement is that large.
+const LARGEST: f64 = 1e60;
+
 /// Refuses samples that no estimator can use.
 ///
 /// # Errors
-/// [`EstimateError::BadNumber`] for the first value or time that is not finite, or sigma that is not positive.
+/// [`EstimateError::BadNumber`] for the first value or time that is not finite, or sigma that is not positive,
+/// or that is beyond 1e60.
 pub fn check(sources: &[Source]) -> Result<(), EstimateError> {
     for source in sources {
         for quantity in Quantity::ALL {
             let good = |s: &Sample| {
-                // a sum is finite only where all of its terms are
-                let sum: f64 = s.value.iter().chain(&s.sigma).sum::<f64>() + s.time_s;
-                sum.is_finite() && s.sigma.iter().all(|v| *v > 0.0)
+                let usable = |v: &f64| v.abs() <= LARGEST;
+                let sane = |v: &f64| (LARGEST.recip()..=LARGEST).contains(v);
+                s.value.iter().all(usable) && s.sigma.iter().all(sane) && usable(&s.time_s)
             };
             if let Some(sample) = source.series(quantity).iter().find(|s| !good(s)) {
                 return Err(bad_number(source, quantity, sample));
@@ -69,8 +98,8 @@ pub fn check(sources: &[Source]) -> Result<(), EstimateError> {
 
 /// What is wrong with a sample that [`check()`] found.
 fn bad_number(source: &Source, quantity: Quantity, sample: &Sample) -> EstimateError {
-    let value = sample.value.iter().find(|v| !v.is_finite());
-    let sigma = sample.sigma.iter().find(|v| !(**v > 0.0 && v.is_finite()));
+    let value = sample.value.iter().find(|v| !(v.abs() <= LARGEST));
+    let sigma = sample.sigma.iter().find(|v| !(LARGEST.recip()..=LARGEST).contains(v));
     let (value, expected) = match (value, sigma) {
         (Some(&v), _) => (v, "a finite number"),
         (None, Some(&v)) => (v, "a positive sigma"),

@@ -12,17 +12,21 @@ use crate::sample::Sample;
 /// Neighbours that lie so unevenly that they amplify noise by more than this tell nothing.
 const MAX_AMPLIFICATION: f64 = 20.0;
 
+/// A series of which a larger share repeats its predecessor is held or quantised: its scatter says nothing.
+const MOST_HELD: f64 = 0.3;
+
 /// Fewest residuals that make an estimate.
 const MIN_RESIDUALS: usize = 12;
 
 /// The standard deviation of the noise of an ordered series, one for all axes; `None` where there are too
-/// few samples to tell.
+/// few samples to tell, or most of them repeat their predecessor.
 ///
 /// Never below 1e-6 of the values' range (or 1e-9), so that noise-free data keep finite weights.
 #[must_use]
 pub fn estimate_sigma(series: &[Sample]) -> Option<f64> {
     let mut residuals: Vec<f64> = series.windows(5).filter_map(residuals).flatten().collect();
-    if residuals.len() < MIN_RESIDUALS {
+    let held = series.windows(2).filter(|w| w[0].value == w[1].value).count();
+    if residuals.len() < MIN_RESIDUALS || held as f64 > MOST_HELD * series.len() as f64 {
         return None;
     }
     let range = (0..3)
@@ -94,6 +98,16 @@ mod tests {
         let sigma = estimate_sigma(&clean).expect("enough");
         assert!(sigma > 0.0 && sigma < 1e-3, "{sigma}");
         assert_eq!(estimate_sigma(&clean[..7]), None);
+    }
+
+    #[test]
+    fn held_values_tell_nothing() {
+        let mut held = series(0.1, 0);
+        for run in held.chunks_mut(10) {
+            let first = run[0].value;
+            run.iter_mut().for_each(|s| s.value = first);
+        }
+        assert_eq!(estimate_sigma(&held), None);
     }
 
     #[test]

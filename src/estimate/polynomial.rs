@@ -17,7 +17,7 @@
 use nalgebra::DVector;
 
 use super::{EstimateError, check};
-use crate::estimate::spline::Coefficients;
+use crate::estimate::Coefficients;
 use crate::math::chebyshev;
 use crate::math::least_squares::{LeastSquares, Solution};
 use crate::sample::{Quantity, Source};
@@ -185,7 +185,8 @@ impl Axis {
     }
 
     fn sigma(&self, row: &[f64]) -> f64 {
-        (self.noise_scale * self.solution.variance_of(&row[self.skipped..])).sqrt()
+        // as SFF: scaled up where the sigmas are too small, never down
+        (self.noise_scale.max(1.0) * self.solution.variance_of(&row[self.skipped..])).sqrt()
     }
 }
 

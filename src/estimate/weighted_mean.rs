@@ -5,7 +5,7 @@
 //! both ends of the overlap when the sources disagree.
 //!
 //! Between samples each source is interpolated linearly. It has no acceleration of its own: the paper
-//! differences its velocities, and so does [`Track::difference_velocities`](crate::track::Track).
+//! differences its velocities, and so does [`fusion`](crate::fusion).
 
 use super::coverage::{Coverage, interpolate};
 use crate::sample::{Quantity, Sample, Source};
@@ -41,7 +41,7 @@ impl WeightedMean {
             .sources
             .iter()
             .enumerate()
-            .filter_map(|(i, s)| interpolate(s.series(quantity), time_s, self.coverage.outage_s(i)))
+            .filter_map(|(i, s)| interpolate(s.series(quantity), time_s, self.coverage.outage_s(i, quantity)))
             .collect();
         let (mut value, mut sigma) = ([0.0; 3], [0.0; 3]);
         for axis in 0..3 {
@@ -53,7 +53,10 @@ impl WeightedMean {
 
     /// The slope of the mean position across `time_s`, for sources that measure no velocity.
     fn slope(&self, time_s: f64) -> Option<([f64; 3], [f64; 3])> {
-        let step = (0..self.sources.len()).map(|i| self.coverage.outage_s(i)).fold(0.0, f64::max) / 10.0;
+        let step = (0..self.sources.len())
+            .map(|i| self.coverage.outage_s(i, Quantity::Position))
+            .fold(0.0, f64::max)
+            / 10.0;
         let end = |t: f64| self.mean(Quantity::Position, t).map(|(p, s)| (t, p, s));
         let here = end(time_s)?;
         let (a, b) = (end(time_s - step).unwrap_or(here), end(time_s + step).unwrap_or(here));

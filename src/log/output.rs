@@ -24,7 +24,7 @@ impl Sink {
     pub(super) fn copy(log: &Log, out: &Path) -> Result<Self, LogError> {
         let index = log.index();
         let written = |source| LogError::Write { path: out.to_owned(), source };
-        let mut file = temporary_beside(out).map_err(written)?;
+        let mut file = temporary_beside(out, readable_by_the_same(&log.file.file)).map_err(written)?;
         let mut source = &log.file.file;
         // Both are plain files, so that the kernel copies, and shares blocks where it can.
         let copied = source
@@ -72,7 +72,7 @@ pub fn write_new<E: From<LogError>>(
 ) -> Result<u64, E> {
     let written = |source| LogError::Write { path: out.to_owned(), source };
     check_name(out, force)?;
-    let mut file = BufWriter::new(temporary_beside(out).map_err(written)?);
+    let mut file = BufWriter::new(temporary_beside(out, None).map_err(written)?);
     write(&mut file)?;
     let len = file.stream_position().map_err(written)?;
     match publish(file, out, force) {
@@ -90,8 +90,9 @@ fn publish(file: BufWriter<NamedTempFile>, out: &Path, force: bool) -> io::Resul
     file.as_file().sync_all()?;
     let named = if force { file.persist(out) } else { file.persist_noclobber(out) };
     named.map_err(|e| e.error)?;
+    // the file is there and whole: that its name is on the disk too is wished for, and not always granted
     #[cfg(unix)]
-    File::open(directory(out))?.sync_all()?;
+    let _ = File::open(directory(out)).and_then(|folder| folder.sync_all());
     Ok(())
 }
 
@@ -99,12 +100,27 @@ fn directory(out: &Path) -> &Path {
     out.parent().filter(|dir| !dir.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-fn temporary_beside(out: &Path) -> io::Result<NamedTempFile> {
+/// The input's permissions, writable by its owner: a private recording's successor is private too.
+fn readable_by_the_same(input: &File) -> Option<fs::Permissions> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        let mode = input.metadata().ok()?.permissions().mode();
+        Some(fs::Permissions::from_mode(mode & 0o666 | 0o200))
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = input;
+        None
+    }
+}
+
+fn temporary_beside(out: &Path, like: Option<fs::Permissions>) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".trackfuse-").suffix(".part");
-    // As any new file, less the user's umask; temporary files are private otherwise.
+    // As the file that it comes from, else as any new file, less the user's umask.
     #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.permissions(like.unwrap_or_else(|| std::os::unix::fs::PermissionsExt::from_mode(0o666)));
     // Less the temporary's own name, which the user didn't choose.
     builder.tempfile_in(directory(out)).map_err(|error| match error.kind() {
         kind @ (io::ErrorKind::NotFound

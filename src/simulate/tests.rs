@@ -333,7 +333,9 @@ fn extreme_scenarios_in_range_end_in_numbers_or_in_an_error() {
 /// Rows `(px, py, pz, vx, vy, vz)` of the recorded truths of a family, made by another simulator.
 fn recorded(names: &[&str]) -> Option<Vec<Vec<[f64; 6]>>> {
     let Some(folder) = std::env::var_os("TRACKFUSE_TEST_DATA") else {
-        println!("skipped: TRACKFUSE_TEST_DATA is not set");
+        // past the test runner, which would keep it to itself
+        let _ =
+            std::io::Write::write_all(&mut std::io::stderr(), b"skipped: TRACKFUSE_TEST_DATA is not set\n");
         return None;
     };
     let mut runs = Vec::new();

@@ -42,7 +42,7 @@ fn exit_code_3_for_sensors_that_never_meet() {
     log.sensor("/beacon/track", &Sensor::new(8.0, 13.0, 2));
     let ran = Trial::of(log.finish()).fuse(&[]);
     assert_eq!(ran.code, 3);
-    assert_says(&ran.stderr, &["tether and beacon never see the vehicle at the same time"]);
+    assert_says(&ran.stderr, &["tether and beacon never measure position at the same time"]);
 }
 
 #[test]

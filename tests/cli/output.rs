@@ -213,7 +213,9 @@ fn output_warnings_stand_on_stderr_unless_quiet() {
 #[test]
 fn output_holds_the_old_messages_for_an_independent_reader() {
     let Some(python) = std::env::var_os("TRACKFUSE_TEST_PYTHON") else {
-        println!("skipped: TRACKFUSE_TEST_PYTHON is not set");
+        // past the test runner, which would keep it to itself
+        let _ =
+            std::io::Write::write_all(&mut std::io::stderr(), b"skipped: TRACKFUSE_TEST_PYTHON is not set\n");
         return;
     };
     let mut logs = vec![two_sensors()];

@@ -35,36 +35,11 @@ pub use normal::Smoothing;
 
 use normal::{Block, Problem, solve};
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-use super::{EstimateError, check};
+use super::{Coefficients, EstimateError, check, coverage};
 use crate::math::gaussian_basis::{Active, GaussianBasis};
 use crate::math::simd::{Kernel, vectorised};
 use crate::sample::{Quantity, Sample, Source};
 use crate::track::{Curve, State};
-
-/// Whether the velocity is the derivative of the position.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Coefficients {
-    /// p = q: it is.
-    #[default]
-    Shared,
-    /// Position and velocity are fitted apart, as eq. 8 says literally.
-    Independent,
-}
-
-impl Coefficients {
-    /// The reading's name in configs and reports.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Shared => "shared",
-            Self::Independent => "independent",
-        }
-    }
-}
 
 /// What may be chosen about the fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,22 +69,29 @@ impl Default for Settings {
     }
 }
 
-/// Samples a knot, on average. 5: finer knots change nothing but the time, since the penalty smooths.
-const SAMPLES_PER_KNOT: f64 = 5.0;
-
 /// No finer by default, s: a vehicle's sharpest moves, a thrust's onset in 0.3 s, are followed at this spacing.
 const FINEST_SPACING_S: f64 = 0.08;
 
 /// Fewest sampling instants that a fit takes: a quadratic has three unknowns, its noise needs one more.
 pub const MIN_SAMPLES: usize = 4;
 
-/// The spacing that gives five samples a knot over `[from_s, to_s]`, all sources pooled, but at least 0.08 s.
+/// The fastest source's median interval, but no finer than 0.08 s.
 ///
-/// The number of knots is so bounded by the number of samples, whatever the times are.
+/// The number of knots is bounded by that of the samples, or by 20,000 where those are fewer, whatever the
+/// times are: samples that come in dense runs need more knots than their mean density has.
 #[must_use]
 pub fn default_knot_spacing_s(sources: &[Source], from_s: f64, to_s: f64) -> f64 {
+    let fastest = sources.iter().filter_map(coverage::median_interval_s).fold(f64::INFINITY, f64::min);
+    let wanted = if fastest.is_finite() { fastest.max(FINEST_SPACING_S) } else { FINEST_SPACING_S };
+    wanted.max(finest_affordable_s(sources, from_s, to_s))
+}
+
+/// The spacing below which there would be more knots than samples, and than 20,000, which cost 20 ms.
+#[must_use]
+pub fn finest_affordable_s(sources: &[Source], from_s: f64, to_s: f64) -> f64 {
+    const CHEAP_KNOTS: usize = 20_000;
     let samples: usize = sources.iter().map(Source::len).sum();
-    ((to_s - from_s) * SAMPLES_PER_KNOT / samples.max(1) as f64).max(FINEST_SPACING_S)
+    (to_s - from_s) / samples.max(CHEAP_KNOTS) as f64
 }
 
 /// A fitted spline.
@@ -147,7 +129,10 @@ pub fn fit(sources: &[Source], from_s: f64, to_s: f64, settings: &Settings) -> R
     if positions == 0 {
         return Err(EstimateError::Undetermined { what: "sff".into(), why: "there is no position" });
     }
-    let spacing = settings.knot_spacing_s.unwrap_or_else(|| default_knot_spacing_s(sources, from_s, to_s));
+    let spacing = settings.knot_spacing_s.map_or_else(
+        || default_knot_spacing_s(sources, from_s, to_s),
+        |asked| asked.max(finest_affordable_s(sources, from_s, to_s)),
+    );
     let basis = GaussianBasis::covering(from_s, to_s, spacing, settings.margin, settings.width);
     let centre = middle(sources);
     let groups: &[&'static [usize]] = if axes_agree(sources) { &[&[0, 1, 2]] } else { &[&[0], &[1], &[2]] };
@@ -186,12 +171,6 @@ fn axes_agree(sources: &[Source]) -> bool {
 }
 
 impl Spline {
-    /// The interval that the knots were laid for, s.
-    #[must_use]
-    pub fn span_s(&self) -> (f64, f64) {
-        (self.from_s, self.to_s)
-    }
-
     /// Number of knots and their spacing, s.
     #[must_use]
     pub fn knots(&self) -> (usize, f64) {
