@@ -1,10 +1,12 @@
 //! What every estimator must keep, whatever its method.
 
+use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use trackfuse::estimate::Coefficients;
 use trackfuse::estimate::EstimateError;
+use trackfuse::estimate::coverage::Coverage;
 use trackfuse::estimate::extrapolation;
 use trackfuse::estimate::polynomial::Prior;
 use trackfuse::fusion::{Fusion, Plan, fuse};
@@ -208,4 +210,49 @@ fn sigmas_are_positive_and_grow_after_the_last_sample() {
             found.track.points.iter().filter(|p| p.seen_by == 0).map(|p| p.state.position_sigma[2]).collect();
         assert!(beyond.len() > 20 && beyond.windows(2).all(|w| w[0] < w[1]), "{method:?}: {beyond:?}");
     });
+}
+
+/// Any series that a log may hold: times in clusters, repeated, far apart; values and sigmas of any size.
+fn any_series() -> impl Strategy<Value = Vec<Sample>> {
+    let time = prop_oneof![0.0..5.0_f64, (0..20).prop_map(|i| f64::from(i) * 0.1), -1e6..1e9_f64];
+    let value = || prop_oneof![-100.0..100.0_f64, Just(0.0), -1e12..1e12_f64];
+    let sigma = || prop_oneof![0.01..1.0_f64, Just(0.1), 1e-9..1e9_f64];
+    let sample = (time, [value(), value(), value()], [sigma(), sigma(), sigma()])
+        .prop_map(|(time_s, value, sigma)| Sample { time_s, value, sigma });
+    proptest::collection::vec(sample, 0..40).prop_map(|mut series| {
+        series.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+        series
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+
+    #[test]
+    fn whatever_the_samples_there_is_a_track_of_numbers_or_an_error(
+        series in proptest::collection::vec((any_series(), any_series()), 1..4),
+        method in 0..4_usize,
+        independent in any::<bool>(),
+        horizon_s in prop_oneof![Just(0.5), Just(30.0)],
+        stop in proptest::option::of(-50.0..50.0_f64),
+    ) {
+        let sources: Vec<Source> = series
+            .into_iter()
+            .enumerate()
+            .map(|(i, (positions, velocities))| Source { name: i.to_string(), positions, velocities })
+            .collect();
+        let coefficients = if independent { Coefficients::Independent } else { Coefficients::Shared };
+        let mut plan = plan(METHODS[method], coefficients);
+        // a track of a size that can be read, as the program sees to
+        let seen_s: f64 = Coverage::of(&sources).pieces(plan.bridge_max_s).iter().map(|p| p.1 - p.0).sum();
+        plan.rate_hz = (2_000.0 / (seen_s + horizon_s)).min(50.0);
+        plan.stop_z_m = stop;
+        plan.extrapolation.as_mut().expect("there is one").horizon_s = horizon_s;
+        if let Ok(found) = fuse(&sources, &plan) {
+            for point in found.track.points {
+                let numbers = point.state.position.iter().chain(&point.state.velocity);
+                prop_assert!(numbers.into_iter().all(|v| v.is_finite()), "{:?}", point);
+            }
+        }
+    }
 }

@@ -98,7 +98,7 @@ pub fn check(sources: &[Source]) -> Result<(), EstimateError> {
 
 /// What is wrong with a sample that [`check()`] found.
 fn bad_number(source: &Source, quantity: Quantity, sample: &Sample) -> EstimateError {
-    let value = sample.value.iter().find(|v| !(v.abs() <= LARGEST));
+    let value = sample.value.iter().find(|v| !(-LARGEST..=LARGEST).contains(*v));
     let sigma = sample.sigma.iter().find(|v| !(LARGEST.recip()..=LARGEST).contains(v));
     let (value, expected) = match (value, sigma) {
         (Some(&v), _) => (v, "a finite number"),
