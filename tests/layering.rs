@@ -20,7 +20,7 @@ const WALLS: [(&str, &[&str]); 10] = [
     ("src/log", &["crate::estimate", "crate::commands", "crate::fusion", "clap", "println!"]),
     ("src/report", &["crate::log", "crate::commands", "mcap", "clap", "std::fs", "println!"]),
     (
-        "src/fusion.rs",
+        "src/fusion",
         &["crate::log", "crate::commands", "crate::config", "mcap", "clap", "std::fs", "println!"],
     ),
     ("src/simulate", &["crate::estimate", "crate::commands", "clap", "std::fs", "println!"]),

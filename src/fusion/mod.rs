@@ -7,20 +7,22 @@
 //! 4. The last piece is carried on ([`extrapolation`]), and once more the paper's plain way.
 //! 5. Characteristic points are looked up on the track.
 
+mod bands;
+mod pieces;
+
+use bands::{Bands, warn_of_disagreement, warn_of_misfit};
+use pieces::{Piece, fit_pieces};
+
 use crate::estimate::Coefficients;
 use crate::estimate::agreement::{self, Disagreement};
 use crate::estimate::characteristic_point::{self, CharacteristicPoint, Height};
 use crate::estimate::coverage::{self, Coverage};
 use crate::estimate::extrapolation::{self, Holdout};
-use crate::estimate::moving_average::MovingAverage;
-use crate::estimate::polynomial;
-use crate::estimate::spline;
-use crate::estimate::weighted_mean::WeightedMean;
 use crate::estimate::{self, EstimateError};
 use crate::quality::{self, PhaseSummary};
-use crate::sample::{Quantity, Source};
+use crate::sample::Source;
 use crate::time::Time;
-use crate::track::{Curve, Method, Phase, State, Track, TrackPoint};
+use crate::track::{Curve, Method, Phase, Track, TrackPoint};
 
 /// What is to be done, every default resolved.
 #[derive(Clone, Debug, PartialEq)]
@@ -90,15 +92,6 @@ pub struct Fusion {
 /// Order of the extrapolation that `/fused/pcf` shows, and the number of last samples it is fitted to:
 /// Zhang 2025's sea trial (order 4, samples 141 to 186).
 const PLAIN_PCF: (usize, usize) = (4, 46);
-
-/// A fitted piece.
-struct Piece {
-    from_s: f64,
-    to_s: f64,
-    sources: Vec<Source>,
-    curve: Box<dyn Curve>,
-    spline: Option<SplineSummary>,
-}
 
 /// Fuses `sources`, each in order of time.
 ///
@@ -172,55 +165,6 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
     })
 }
 
-/// What the bands hold beside a curve's own sigma: what the sources, not being registered, may differ by.
-struct Bands {
-    /// In position, m, and velocity, m/s, by axis.
-    systematic: [[f64; 3]; 2],
-    /// Whether they differ by so much that they pull the curve away from the datum even where it sees alone.
-    everywhere: bool,
-    /// Whether a source could not be compared with the datum in position or velocity, so that without the
-    /// datum nobody knows how sure the track is.
-    unknown: [bool; 2],
-    /// The datum's bit, and when it sees, s.
-    datum: u32,
-    datum_runs: Vec<(f64, f64)>,
-}
-
-impl Bands {
-    fn of(sources: &[Source], coverage: &Coverage, disagreements: &[Disagreement], plan: &Plan) -> Self {
-        let apart = |q| agreement::uncompared(sources, disagreements, q);
-        Self {
-            systematic: Quantity::ALL.map(|q| agreement::systematic_sigma(disagreements, q)),
-            everywhere: disagreements.iter().any(Disagreement::is_significant),
-            unknown: Quantity::ALL
-                .map(|q| apart(q).iter().any(|pair| pair.0 == plan.datum || pair.1 == plan.datum)),
-            datum: 1 << plan.datum,
-            datum_runs: coverage.runs(plan.datum).to_vec(),
-        }
-    }
-
-    /// The state with the sigmas that it deserves; NaN for those that nobody knows.
-    fn widen(&self, mut state: State, time_s: f64, seen_by: u32) -> State {
-        let [position, velocity] = self.systematic;
-        // away from the datum, velocities that differ make positions drift apart
-        let away = |run: &(f64, f64)| (run.0 - time_s).max(time_s - run.1).max(0.0);
-        let away_s = self.datum_runs.iter().map(away).fold(f64::INFINITY, f64::min);
-        let away_s = if away_s.is_finite() { away_s } else { 0.0 };
-        for axis in 0..3 {
-            let (p, v) = (&mut state.position_sigma[axis], &mut state.velocity_sigma[axis]);
-            if self.everywhere || seen_by != self.datum {
-                *p = p.hypot(position[axis] + velocity[axis] * away_s);
-                *v = v.hypot(velocity[axis]);
-            }
-            if seen_by & self.datum == 0 {
-                *p = if self.unknown[0] { f64::NAN } else { *p };
-                *v = if self.unknown[1] { f64::NAN } else { *v };
-            }
-        }
-        state
-    }
-}
-
 /// The points of a piece between its first and last sample.
 fn observed(piece: &Piece, coverage: &Coverage, bands: &Bands, plan: &Plan) -> Vec<TrackPoint> {
     let point = |time_s| {
@@ -292,111 +236,6 @@ fn events(track: &Track, plan: &Plan, warnings: &mut Vec<String>) -> Vec<Charact
     events
 }
 
-/// Fits every piece that can be, and warns of those that can't.
-fn fit_pieces(
-    sources: &[Source],
-    coverage: &Coverage,
-    plan: &Plan,
-    warnings: &mut Vec<String>,
-) -> Result<Vec<Piece>, EstimateError> {
-    let (mut fitted, mut first_error) = (Vec::new(), None);
-    let (mut lost_samples, mut lost_at) = (0, None);
-    for (from_s, to_s) in coverage.pieces(plan.bridge_max_s) {
-        let inside: Vec<Source> = sources.iter().map(|s| s.within(from_s, to_s)).collect();
-        match fit(&inside, from_s, to_s, plan) {
-            Ok((curve, spline)) => fitted.push(Piece { from_s, to_s, sources: inside, curve, spline }),
-            Err(error) => {
-                lost_samples += inside.iter().map(Source::len).sum::<usize>();
-                lost_at.get_or_insert(plan.origin.plus_seconds(from_s));
-                first_error.get_or_insert(error);
-            }
-        }
-    }
-    match (fitted.is_empty(), first_error) {
-        (true, Some(error)) => return Err(error),
-        (true, None) => {
-            let what = plan.method.name().to_owned();
-            return Err(EstimateError::TooFewSamples { what, needed: spline::MIN_SAMPLES, got: 0 });
-        }
-        _ => {}
-    }
-    if let Some(at) = lost_at {
-        warnings.push(format!(
-            "left out: {lost_samples} {} more than {} s away from all others, too few to fit, the first at {at} \
-             (wrong stamps?)",
-            if lost_samples == 1 { "sample" } else { "samples" },
-            plan.bridge_max_s
-        ));
-    }
-    if fitted.len() > 1 {
-        let longest = fitted.windows(2).map(|w| w[1].from_s - w[0].to_s).fold(0.0, f64::max);
-        warnings.push(format!(
-            "nobody sees the vehicle for up to {longest:.1} s, more than bridge_max_s = {} s: the track is cut \
-             into {} pieces",
-            plan.bridge_max_s,
-            fitted.len()
-        ));
-    }
-    Ok(fitted)
-}
-
-type Fitted = (Box<dyn Curve>, Option<SplineSummary>);
-
-fn fit(sources: &[Source], from_s: f64, to_s: f64, plan: &Plan) -> Result<Fitted, EstimateError> {
-    let got = instants(sources);
-    if got < spline::MIN_SAMPLES {
-        let what = plan.method.name().to_owned();
-        return Err(EstimateError::TooFewSamples { what, needed: spline::MIN_SAMPLES, got });
-    }
-    match plan.method {
-        Method::Spline => {
-            let settings = spline::Settings {
-                knot_spacing_s: plan.knot_spacing_s,
-                coefficients: plan.coefficients,
-                ..spline::Settings::default()
-            };
-            let fitted = spline::fit(sources, from_s, to_s, &settings)?;
-            let summary = SplineSummary {
-                knots: fitted.knots(),
-                lambda: fitted.lambda(),
-                noise_scale: fitted.noise_scale(),
-            };
-            Ok((Box::new(fitted), Some(summary)))
-        }
-        Method::Polynomial => {
-            let fitted = polynomial::fit(sources, from_s, to_s, plan.order, plan.coefficients, None)?;
-            Ok((Box::new(fitted), None))
-        }
-        Method::WeightedMean => Ok((Box::new(WeightedMean::new(sources.to_vec())), None)),
-        Method::MovingAverage => {
-            let mean = WeightedMean::new(sources.to_vec());
-            let times = grid(from_s, to_s, plan.rate_hz);
-            let average = MovingAverage::of(&mean, times, plan.window_points, 1.5 / plan.rate_hz)?;
-            Ok((Box::new(average), None))
-        }
-    }
-}
-
-/// Number of different sampling instants, counted up to [`spline::MIN_SAMPLES`] of each series.
-fn instants(sources: &[Source]) -> usize {
-    let mut times: Vec<f64> = Vec::new();
-    for series in sources.iter().flat_map(|s| Quantity::ALL.map(|q| s.series(q))) {
-        let mut own: Vec<f64> = Vec::new();
-        for sample in series {
-            if own.last() != Some(&sample.time_s) {
-                own.push(sample.time_s);
-            }
-            if own.len() == spline::MIN_SAMPLES {
-                break;
-            }
-        }
-        times.extend(own);
-    }
-    times.sort_by(f64::total_cmp);
-    times.dedup();
-    times.len()
-}
-
 /// Instants from `from_s` on, `1 / rate_hz` apart, up to `to_s`.
 fn grid(from_s: f64, to_s: f64, rate_hz: f64) -> impl Iterator<Item = f64> {
     let count = ((to_s - from_s) * rate_hz + 1e-6).floor().max(0.0) as usize;
@@ -429,44 +268,6 @@ fn difference_velocities(points: &mut [TrackPoint], max_step_s: f64) {
     let slopes: Vec<Option<[f64; 3]>> = (0..points.len()).map(slope).collect();
     for (point, slope) in points.iter_mut().zip(slopes) {
         point.state.acceleration = point.state.acceleration.or(slope);
-    }
-}
-
-fn warn_of_disagreement(sources: &[Source], disagreements: &[Disagreement], warnings: &mut Vec<String>) {
-    for d in disagreements.iter().filter(|d| d.is_significant()) {
-        let (first, second) = (&sources[d.sources.0].name, &sources[d.sources.1].name);
-        let (what, unit) = (d.quantity.name(), d.quantity.unit());
-        let [x, y, z] = d.median;
-        warnings.push(format!(
-            "{second} and {first} disagree in {what} by more than their sigmas and are not registered: \
-             {second} - {first} = ({x:+.2}, {y:+.2}, {z:+.2}) {unit}; the track lies between them and every \
-             band is widened by that much",
-        ));
-    }
-    for quantity in Quantity::ALL {
-        for (first, second) in agreement::uncompared(sources, disagreements, quantity) {
-            let what = quantity.name();
-            warnings.push(format!(
-                "{} and {} never measure {what} at the same time: nobody can say whether they agree, and where \
-                 the datum doesn't see the track has no sigma of its {what}",
-                sources[first].name, sources[second].name
-            ));
-        }
-    }
-}
-
-/// Residuals this many times the sigmas mean that something is wrong with one or the other.
-const MISFIT: f64 = 2.0;
-
-/// Warns of a fit that leaves more than noise, where no known disagreement explains it.
-fn warn_of_misfit(pieces: &[Piece], disagreements: &[Disagreement], warnings: &mut Vec<String>) {
-    let scales = pieces.iter().filter_map(|p| p.spline).flat_map(|s| s.noise_scale);
-    let worst = scales.fold(0.0, f64::max);
-    if worst > MISFIT && !disagreements.iter().any(Disagreement::is_significant) {
-        warnings.push(format!(
-            "the samples lie up to {worst:.1} times their sigmas from the track (root mean square): outliers, \
-             sigmas that are too small, or sources that disagree; the bands are widened by that factor"
-        ));
     }
 }
 

@@ -1,0 +1,124 @@
+//! The pieces that long silences cut a log into, each fitted by the method that was asked for.
+
+use super::{Plan, SplineSummary, grid};
+use crate::estimate::EstimateError;
+use crate::estimate::coverage::Coverage;
+use crate::estimate::moving_average::MovingAverage;
+use crate::estimate::weighted_mean::WeightedMean;
+use crate::estimate::{polynomial, spline};
+use crate::sample::{Quantity, Source};
+use crate::track::{Curve, Method};
+
+/// A fitted piece.
+pub(super) struct Piece {
+    pub(super) from_s: f64,
+    pub(super) to_s: f64,
+    pub(super) sources: Vec<Source>,
+    pub(super) curve: Box<dyn Curve>,
+    pub(super) spline: Option<SplineSummary>,
+}
+
+/// Fits every piece that can be, and warns of those that can't.
+pub(super) fn fit_pieces(
+    sources: &[Source],
+    coverage: &Coverage,
+    plan: &Plan,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Piece>, EstimateError> {
+    let (mut fitted, mut first_error) = (Vec::new(), None);
+    let (mut lost_samples, mut lost_at) = (0, None);
+    for (from_s, to_s) in coverage.pieces(plan.bridge_max_s) {
+        let inside: Vec<Source> = sources.iter().map(|s| s.within(from_s, to_s)).collect();
+        match fit(&inside, from_s, to_s, plan) {
+            Ok((curve, spline)) => fitted.push(Piece { from_s, to_s, sources: inside, curve, spline }),
+            Err(error) => {
+                lost_samples += inside.iter().map(Source::len).sum::<usize>();
+                lost_at.get_or_insert(plan.origin.plus_seconds(from_s));
+                first_error.get_or_insert(error);
+            }
+        }
+    }
+    match (fitted.is_empty(), first_error) {
+        (true, Some(error)) => return Err(error),
+        (true, None) => {
+            let what = plan.method.name().to_owned();
+            return Err(EstimateError::TooFewSamples { what, needed: spline::MIN_SAMPLES, got: 0 });
+        }
+        _ => {}
+    }
+    if let Some(at) = lost_at {
+        warnings.push(format!(
+            "left out: {lost_samples} {} more than {} s away from all others, too few to fit, the first at {at} \
+             (wrong stamps?)",
+            if lost_samples == 1 { "sample" } else { "samples" },
+            plan.bridge_max_s
+        ));
+    }
+    if fitted.len() > 1 {
+        let longest = fitted.windows(2).map(|w| w[1].from_s - w[0].to_s).fold(0.0, f64::max);
+        warnings.push(format!(
+            "nobody sees the vehicle for up to {longest:.1} s, more than bridge_max_s = {} s: the track is cut \
+             into {} pieces",
+            plan.bridge_max_s,
+            fitted.len()
+        ));
+    }
+    Ok(fitted)
+}
+
+type Fitted = (Box<dyn Curve>, Option<SplineSummary>);
+
+fn fit(sources: &[Source], from_s: f64, to_s: f64, plan: &Plan) -> Result<Fitted, EstimateError> {
+    let got = instants(sources);
+    if got < spline::MIN_SAMPLES {
+        let what = plan.method.name().to_owned();
+        return Err(EstimateError::TooFewSamples { what, needed: spline::MIN_SAMPLES, got });
+    }
+    match plan.method {
+        Method::Spline => {
+            let settings = spline::Settings {
+                knot_spacing_s: plan.knot_spacing_s,
+                coefficients: plan.coefficients,
+                ..spline::Settings::default()
+            };
+            let fitted = spline::fit(sources, from_s, to_s, &settings)?;
+            let summary = SplineSummary {
+                knots: fitted.knots(),
+                lambda: fitted.lambda(),
+                noise_scale: fitted.noise_scale(),
+            };
+            Ok((Box::new(fitted), Some(summary)))
+        }
+        Method::Polynomial => {
+            let fitted = polynomial::fit(sources, from_s, to_s, plan.order, plan.coefficients, None)?;
+            Ok((Box::new(fitted), None))
+        }
+        Method::WeightedMean => Ok((Box::new(WeightedMean::new(sources.to_vec())), None)),
+        Method::MovingAverage => {
+            let mean = WeightedMean::new(sources.to_vec());
+            let times = grid(from_s, to_s, plan.rate_hz);
+            let average = MovingAverage::of(&mean, times, plan.window_points, 1.5 / plan.rate_hz)?;
+            Ok((Box::new(average), None))
+        }
+    }
+}
+
+/// Number of different sampling instants, counted up to [`spline::MIN_SAMPLES`] of each series.
+fn instants(sources: &[Source]) -> usize {
+    let mut times: Vec<f64> = Vec::new();
+    for series in sources.iter().flat_map(|s| Quantity::ALL.map(|q| s.series(q))) {
+        let mut own: Vec<f64> = Vec::new();
+        for sample in series {
+            if own.last() != Some(&sample.time_s) {
+                own.push(sample.time_s);
+            }
+            if own.len() == spline::MIN_SAMPLES {
+                break;
+            }
+        }
+        times.extend(own);
+    }
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    times.len()
+}
