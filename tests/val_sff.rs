@@ -222,3 +222,50 @@ fn the_likelihood_finds_a_penalty_whose_errors_fit_the_bands() {
     }
     assert!(inside * 100 > 85 * total, "{inside} of {total} inside the 95 % band");
 }
+
+/// Positions alone at the given times, with noise of `sigma`.
+fn fixes(times: impl Iterator<Item = f64>, truth: impl Fn(f64) -> f64, sigma: f64) -> Source {
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    let sample = |t: f64, rng: &mut ChaCha8Rng| Sample {
+        time_s: t,
+        value: std::array::from_fn(|_| truth(t) + sigma * normal(rng)),
+        sigma: [sigma; 3],
+    };
+    Source {
+        name: "fixes".into(),
+        positions: times.map(|t| sample(t, &mut rng)).collect(),
+        velocities: Vec::new(),
+    }
+}
+
+#[test]
+fn an_hour_of_fixes_every_20_s_is_followed_within_their_noise() {
+    let truth = |t: f64| 20.0 * (std::f64::consts::TAU * t / 150.0).sin();
+    let source = fixes((0..181).map(|i| 20.0 * f64::from(i)), truth, 0.5);
+    let fitted = spline::fit(&[source], 0.0, 3600.0, &Settings::default()).expect("a good problem");
+    let (mut squares, mut inside) = (0.0, 0);
+    for i in 0..=3600 {
+        let state = fitted.at(f64::from(i)).expect("inside");
+        let error = state.position[0] - truth(f64::from(i));
+        squares += error * error;
+        inside += usize::from(error.abs() < 1.96 * state.position_sigma[0]);
+    }
+    assert!((squares / 3601.0).sqrt() < 0.6, "{}", (squares / 3601.0).sqrt());
+    assert!(inside > 3200, "{inside} of 3601 inside the 95 % band");
+}
+
+#[test]
+fn a_sharp_move_in_an_hour_of_sparse_fixes_is_followed_or_its_misfit_shows() {
+    // 4 s at 50 Hz in the middle of an hour at 20 s: up by 60 m
+    let truth = |t: f64| 60.0 / (1.0 + (-(t - 1802.0) * 3.0).exp());
+    let sparse = (0..181).map(|i| 20.0 * f64::from(i));
+    let mut times: Vec<f64> = sparse.chain((0..200).map(|i| 1800.01 + 0.02 * f64::from(i))).collect();
+    times.sort_by(f64::total_cmp);
+    let source = fixes(times.into_iter(), truth, 0.1);
+    let fitted = spline::fit(&[source], 0.0, 3600.0, &Settings::default()).expect("a good problem");
+    let errors = (0..400).map(|i| 1800.0 + 0.01 * f64::from(i));
+    let squares: f64 = errors.map(|t| (fitted.at(t).expect("inside").position[0] - truth(t)).powi(2)).sum();
+    let rmse = (squares / 400.0).sqrt();
+    assert!(rmse < 0.3 || fitted.noise_scale()[0] > 2.0, "{rmse} m, scale {:?}", fitted.noise_scale());
+    assert!(fitted.knots().0 < 21_000, "{:?}", fitted.knots());
+}
