@@ -41,10 +41,9 @@ impl Disagreement {
     }
 }
 
-/// Compares every two sources in every quantity that both measure in their overlap.
+/// Compares every two sources, of this `coverage`, in every quantity that both measure in their overlap.
 #[must_use]
-pub fn compare(sources: &[Source]) -> Vec<Disagreement> {
-    let coverage = Coverage::of(sources);
+pub fn compare(sources: &[Source], coverage: &Coverage) -> Vec<Disagreement> {
     let mut found = Vec::new();
     for second in 0..sources.len() {
         for first in 0..second {
@@ -160,10 +159,14 @@ mod tests {
         Source { name: "test".into(), positions, velocities: Vec::new() }
     }
 
+    fn compared(sources: &[Source]) -> Vec<Disagreement> {
+        compare(sources, &Coverage::of(sources))
+    }
+
     #[test]
     fn honest_sources_agree_in_all_of_a_hundred_pairs() {
         for seed in 0..100 {
-            let found = compare(&[source(seed, 0.0, 0.0, 0.02), source(seed + 1000, 0.0, 1.0, 0.05)]);
+            let found = compared(&[source(seed, 0.0, 0.0, 0.02), source(seed + 1000, 0.0, 1.0, 0.05)]);
             assert_eq!(found.len(), 1);
             assert!(!found[0].is_significant(), "{found:?}");
             let systematic = systematic_sigma(&found, Quantity::Position);
@@ -174,7 +177,7 @@ mod tests {
     #[test]
     fn a_bias_of_one_sigma_is_found_with_its_sign() {
         for (first, second, sign) in [(0.0, 0.15, 1.0), (0.15, 0.0, -1.0)] {
-            let found = compare(&[source(1, first, 0.0, 0.02), source(2, second, 0.5, 0.02)]);
+            let found = compared(&[source(1, first, 0.0, 0.02), source(2, second, 0.5, 0.02)]);
             assert!(found[0].is_significant());
             assert!((found[0].median[1] - sign * 0.15).abs() < 0.05, "{found:?}");
             assert!(systematic_sigma(&found, Quantity::Position)[1] > 0.1);
@@ -183,7 +186,7 @@ mod tests {
 
     #[test]
     fn sources_that_never_meet_are_not_compared() {
-        let found = compare(&[source(1, 0.0, 0.0, 0.02), source(2, 9.0, 5.0, 0.02)]);
+        let found = compared(&[source(1, 0.0, 0.0, 0.02), source(2, 9.0, 5.0, 0.02)]);
         assert!(found.is_empty());
         let apart = [source(1, 0.0, 0.0, 0.02), source(2, 9.0, 5.0, 0.02)];
         assert_eq!(uncompared(&apart, &found, Quantity::Position), [(0, 1)]);

@@ -103,7 +103,7 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
     let mut warnings = Vec::new();
     let pieces = fit_pieces(sources, &coverage, plan, &mut warnings)?;
 
-    let disagreements = agreement::compare(sources);
+    let disagreements = agreement::compare(sources, &coverage);
     let bands = Bands::of(sources, &coverage, &disagreements, plan);
     warn_of_disagreement(sources, &disagreements, &mut warnings);
     warn_of_misfit(&pieces, &disagreements, &mut warnings);

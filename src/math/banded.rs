@@ -245,10 +245,7 @@ impl LogProduct {
 
 impl Cholesky {
     /// Overwrites the right sides b (n rows, R columns) by `L^-1 b`.
-    ///
-    /// # Panics
-    /// When b has fewer rows than the matrix.
-    pub fn forward<const R: usize>(&self, b: &mut [[f64; R]]) {
+    fn forward<const R: usize>(&self, b: &mut [[f64; R]]) {
         let n = self.factor.size;
         for j in 0..n {
             let column = self.factor.row(j);
