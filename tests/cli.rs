@@ -8,7 +8,9 @@
 
 mod cli {
     mod bad_input;
+    mod compare;
     mod exit_code;
+    mod export;
     mod output;
     mod readme;
     mod real_logs;

@@ -1,4 +1,4 @@
-//! How good a track is: how far the samples lie from it, phase by phase, and how sure it is of itself.
+//! How far the samples lie from the track, phase by phase, and how sure the track is of itself.
 
 use crate::estimate::coverage::Coverage;
 use crate::sample::{Quantity, Source};
