@@ -13,8 +13,11 @@ use trackfuse::{estimate::characteristic_point::Height, resolve, source};
 
 use super::climbs::Climb;
 
-/// The methods of the tables, and how a config asks for them.
-pub(crate) const METHODS: [(&str, fn(&mut Config)); 7] = [
+/// How a config asks for a method.
+type Ask = fn(&mut Config);
+
+/// The methods of the tables.
+pub(crate) const METHODS: [(&str, Ask); 7] = [
     ("GDF", |c| c.fusion.method = Method::WeightedMean),
     ("PCF 12", |c| c.fusion.method = Method::Polynomial),
     ("average 5", |c| (c.fusion.method, c.fusion.window_points) = (Method::MovingAverage, 5)),
@@ -173,7 +176,7 @@ fn run(climb: &Climb) -> Run {
 }
 
 /// The way of `trackfuse fuse`, up to the track.
-fn fuse(climb: &Climb, ask: fn(&mut Config)) -> Fusion {
+fn fuse(climb: &Climb, ask: Ask) -> Fusion {
     let mut config = Config::default();
     // half as far again, so that a slow track still reaches the last height
     config.extrapolation.horizon_s = 1.5 * climb.unseen_s;
