@@ -8,9 +8,8 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::Coefficients;
+use crate::estimate::{Coefficients, Estimator};
 use crate::log::Compression;
-use crate::track::Method;
 
 /// Why a config can't be used.
 #[derive(Debug, thiserror::Error)]
@@ -183,7 +182,7 @@ pub enum VelocityFrame {
 #[serde(deny_unknown_fields, default)]
 pub struct Fusion {
     /// The estimator.
-    pub method: Method,
+    pub method: Estimator,
     /// Whether the velocity is the derivative of the position (`shared`), or both are fitted apart.
     pub coefficients: Coefficients,
     /// What is registered between sources: "auto" for all that the program can, [] for nothing.
@@ -202,7 +201,7 @@ pub struct Fusion {
 impl Default for Fusion {
     fn default() -> Self {
         Self {
-            method: Method::Spline,
+            method: Estimator::Sff,
             coefficients: Coefficients::Shared,
             estimate: Registration::Auto(Auto::Auto),
             knot_spacing_s: None,
@@ -241,10 +240,11 @@ pub struct Extrapolation {
     pub horizon_s: f64,
     /// Order of the polynomial.
     pub order: usize,
-    /// Length of the stretch that it is fitted to, s; default: 1.4, or 12 median intervals of the slowest source.
+    /// Length of the stretch that it is fitted to, s; default: 1.4 (drag: 0.9), or 12 median intervals of the slowest
+    /// source.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub window_s: Option<f64>,
-    /// Whether jerk and snap are kept small; without, it is the paper's plain least squares.
+    /// Whether the polynomial's acceleration dies away; without, it is the paper's plain least squares.
     pub prior: bool,
     /// Height at which it stops, m: the surface, say.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -271,6 +271,10 @@ pub enum ExtrapolationMethod {
     /// A constrained polynomial.
     #[default]
     Pcf,
+    /// Constant force and quadratic drag.
+    Drag,
+    /// Whichever of both does better from earlier instants of the same log.
+    Auto,
 }
 
 /// A height whose first upward crossing is reported.

@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use crate::config::{Config, Registration};
+use crate::config::{self, Config, ExtrapolationMethod, Registration};
 use crate::estimate::characteristic_point::Height;
+use crate::estimate::coverage;
+use crate::estimate::extrapolation::{self, Law, LawKind};
 use crate::estimate::polynomial::Prior;
-use crate::estimate::{coverage, extrapolation};
 use crate::fusion::{self, Fusion, Plan};
 use crate::sample::Source;
 use crate::source::Loaded;
@@ -75,7 +76,6 @@ pub fn plan(
     let frame_id = output.frame_id.get_or_insert_with(|| loaded[datum].frame_id.clone()).clone();
     output.surface_at_zero.get_or_insert_with(|| surface_at_zero(sources));
     fuse.estimate = Registration::List(Vec::new()); // all that can be estimated today
-    let window_s = *beyond.window_s.get_or_insert_with(|| default_window_s(sources));
     Ok(Plan {
         origin,
         frame_id,
@@ -87,12 +87,8 @@ pub fn plan(
         order: fuse.order,
         window_points: fuse.window_points,
         bridge_max_s: fuse.bridge_max_s,
-        extrapolation: (beyond.horizon_s > 0.0).then(|| extrapolation::Settings {
-            order: beyond.order,
-            window_s,
-            prior: beyond.prior.then_some(Prior { sigma: PRIOR_SIGMA }),
-            horizon_s: beyond.horizon_s,
-        }),
+        extrapolation: (beyond.horizon_s > 0.0)
+            .then(|| extrapolation::Settings { laws: laws(beyond, sources), horizon_s: beyond.horizon_s }),
         stop_z_m: beyond.stop_z_m,
         heights: config
             .characteristic_point
@@ -136,14 +132,25 @@ fn rate_hz(config: &Config, sources: &[Source], warnings: &mut Vec<String>) -> R
     Ok(lowered)
 }
 
-/// Standard deviation of jerk, m/s^3, and snap, m/s^4, in the extrapolation's prior: the best of several on
-/// simulated steep climbs.
-const PRIOR_SIGMA: f64 = 0.5;
+/// The extrapolation's prior: the acceleration dies away in 2 s, its derivatives within 0.25 m/s^3, m/s^4. The best of
+/// several on simulated climbs; a body slowed by the drag k v^2 has tau = 1 / 2 k v, 2 s at 12 m/s and 0.02 /m.
+const PRIOR: Prior = Prior { sigma: 0.25, decay_s: Some(2.0) };
 
-/// 1.4 s, the best of several on simulated steep climbs, or 12 median intervals of the slowest source.
-fn default_window_s(sources: &[Source]) -> f64 {
+/// What the track may be carried on by. Each law is fitted to the last stretch, by default of the length that was the
+/// best of several on simulated climbs, but of at least 12 median intervals of the slowest source.
+fn laws(beyond: &config::Extrapolation, sources: &[Source]) -> Vec<Law> {
     let slowest = sources.iter().filter_map(coverage::median_interval_s).fold(0.0, f64::max);
-    f64::max(1.4, 12.0 * slowest)
+    let window_s = |default_s: f64| beyond.window_s.unwrap_or(f64::max(default_s, 12.0 * slowest));
+    let polynomial = Law {
+        kind: LawKind::Polynomial { order: beyond.order, prior: beyond.prior.then_some(PRIOR) },
+        window_s: window_s(1.4),
+    };
+    let drag = Law { kind: LawKind::Drag, window_s: window_s(0.9) };
+    match beyond.method {
+        ExtrapolationMethod::Pcf => vec![polynomial],
+        ExtrapolationMethod::Drag => vec![drag],
+        ExtrapolationMethod::Auto => vec![polynomial, drag],
+    }
 }
 
 /// The datum's first sample that is in the track, which a stray stamp is not: T0.

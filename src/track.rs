@@ -84,6 +84,9 @@ pub enum Method {
     /// Moving average over the weighted mean.
     #[serde(rename = "moving-average")]
     MovingAverage,
+    /// Constant force and quadratic drag, for extrapolation only.
+    #[serde(rename = "drag")]
+    Drag,
 }
 
 impl Method {
@@ -95,6 +98,7 @@ impl Method {
             Self::Polynomial => "pcf",
             Self::Spline => "sff",
             Self::MovingAverage => "moving-average",
+            Self::Drag => "drag",
         }
     }
 }

@@ -14,10 +14,9 @@ use trackfuse::sample::{Quantity, Sample, Source};
 use trackfuse::time::Time;
 use trackfuse::track::{Method, TrackPoint};
 
-const METHODS: [Method; 4] =
-    [Method::WeightedMean, Method::Polynomial, Method::Spline, Method::MovingAverage];
+const METHODS: [Method; 4] = [Estimator::Gdf, Estimator::Pcf, Estimator::Sff, Estimator::MovingAverage];
 
-fn plan(method: Method, coefficients: Coefficients) -> Plan {
+fn plan(method: Estimator, coefficients: Coefficients) -> Plan {
     Plan {
         origin: Time::from_ns(1_700_000_000_000_000_000),
         frame_id: "enu".into(),
@@ -30,9 +29,10 @@ fn plan(method: Method, coefficients: Coefficients) -> Plan {
         window_points: 5,
         bridge_max_s: 5.0,
         extrapolation: Some(extrapolation::Settings {
-            order: 4,
-            window_s: 1.4,
-            prior: Some(Prior { sigma: 0.5 }),
+            laws: vec![Law {
+                kind: LawKind::Polynomial { order: 4, prior: Some(Prior { sigma: 0.5, decay_s: None }) },
+                window_s: 1.4,
+            }],
             horizon_s: 0.5,
         }),
         stop_z_m: None,
@@ -63,7 +63,7 @@ fn sources(noise: f64) -> Vec<Source> {
     vec![make("tether", 0.0, 2.2, 0.02), make("beacon", 1.6, 4.0, 0.043)]
 }
 
-fn run(sources: &[Source], method: Method, coefficients: Coefficients) -> Fusion {
+fn run(sources: &[Source], method: Estimator, coefficients: Coefficients) -> Fusion {
     fuse(sources, &plan(method, coefficients)).expect("a good problem")
 }
 
@@ -92,11 +92,11 @@ fn assert_close(a: [f64; 3], b: [f64; 3], tolerance: f64, what: &str) {
 
 /// The penalty's weight is found to a tenth of a decade: where data differ by rounding it may end elsewhere
 /// within that.
-fn tolerance_m(method: Method) -> f64 {
-    if method == Method::Spline { 5e-3 } else { 1e-6 }
+fn tolerance_m(method: Estimator) -> f64 {
+    if method == Estimator::Sff { 5e-3 } else { 1e-6 }
 }
 
-fn assert_same_points(a: &[TrackPoint], b: &[TrackPoint], method: Method, what: &str) {
+fn assert_same_points(a: &[TrackPoint], b: &[TrackPoint], method: Estimator, what: &str) {
     assert_eq!(a.len(), b.len(), "{what}");
     for (a, b) in a.iter().zip(b) {
         assert_close(a.state.position, b.state.position, tolerance_m(method), what);
@@ -111,15 +111,15 @@ fn noise_free_data_of_a_parabola_are_met_exactly_but_for_interpolation_and_avera
         let found = run(&sources(0.0), method, coefficients);
         // straight lines between samples 43 ms apart, and 5 points of a parabola
         let tolerance = match method {
-            Method::Polynomial => 1e-7,
-            Method::Spline => 1e-4,
-            Method::WeightedMean | Method::MovingAverage => 5e-2,
+            Estimator::Pcf => 1e-7,
+            Estimator::Sff => 1e-4,
+            Estimator::Gdf | Estimator::MovingAverage => 5e-2,
         };
         for point in found.track.points {
             let t = point.time.seconds_since(Time::from_ns(1_700_000_000_000_000_000));
             let truth = [2.0 * t, 0.3 * t * t, -60.0 + 8.0 * t];
             // a moving average is cut off, and so leans inwards, at the ends
-            if method != Method::MovingAverage || (0.05..3.9).contains(&t) {
+            if method != Estimator::MovingAverage || (0.05..3.9).contains(&t) {
                 assert_close(point.state.position, truth, tolerance, &format!("{method:?} at {t}"));
             }
         }
@@ -171,7 +171,7 @@ fn the_order_of_samples_of_one_instant_does_not_matter() {
         }
     }
     // the weighted mean takes one of two samples of an instant, by their order
-    for method in [Method::Spline, Method::Polynomial] {
+    for method in [Estimator::Sff, Estimator::Pcf] {
         let (a, b) =
             (run(&doubled, method, Coefficients::Shared), run(&swapped, method, Coefficients::Shared));
         assert_same_points(&a.track.points, &b.track.points, method, &format!("{method:?}"));

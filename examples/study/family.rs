@@ -3,12 +3,12 @@
 use std::thread;
 
 use trackfuse::config::{CharacteristicPoint, Config};
-use trackfuse::estimate::Coefficients;
+use trackfuse::estimate::{Coefficients, Estimator};
 use trackfuse::fusion::{self, Fusion};
 use trackfuse::log::Log;
 use trackfuse::quality::{self, Comparison, Errors, Kind, Stretch};
 use trackfuse::sample::Source;
-use trackfuse::track::{Method, Phase, Track};
+use trackfuse::track::{Phase, Track};
 use trackfuse::{estimate::characteristic_point::Height, resolve, source};
 
 use super::climbs::Climb;
@@ -18,11 +18,11 @@ type Ask = fn(&mut Config);
 
 /// The methods of the tables.
 pub(crate) const METHODS: [(&str, Ask); 7] = [
-    ("GDF", |c| c.fusion.method = Method::WeightedMean),
-    ("PCF 12", |c| c.fusion.method = Method::Polynomial),
-    ("average 5", |c| (c.fusion.method, c.fusion.window_points) = (Method::MovingAverage, 5)),
-    ("average 16", |c| (c.fusion.method, c.fusion.window_points) = (Method::MovingAverage, 16)),
-    ("average 32", |c| (c.fusion.method, c.fusion.window_points) = (Method::MovingAverage, 32)),
+    ("GDF", |c| c.fusion.method = Estimator::Gdf),
+    ("PCF 12", |c| c.fusion.method = Estimator::Pcf),
+    ("average 5", |c| (c.fusion.method, c.fusion.window_points) = (Estimator::MovingAverage, 5)),
+    ("average 16", |c| (c.fusion.method, c.fusion.window_points) = (Estimator::MovingAverage, 16)),
+    ("average 32", |c| (c.fusion.method, c.fusion.window_points) = (Estimator::MovingAverage, 32)),
     ("SFF independent", |c| c.fusion.coefficients = Coefficients::Independent),
     ("SFF", |_| ()),
 ];

@@ -14,6 +14,35 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::sample::{Quantity, Sample, Source};
+use crate::track::Method;
+
+/// The estimators.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Estimator {
+    /// General data fusion, the weighted mean.
+    Gdf,
+    /// Polynomial constraint fusion.
+    Pcf,
+    /// Spline function fusion.
+    #[default]
+    Sff,
+    /// Moving average over the weighted mean.
+    MovingAverage,
+}
+
+impl Estimator {
+    /// The method of the points that it makes.
+    #[must_use]
+    pub fn method(self) -> Method {
+        match self {
+            Self::Gdf => Method::WeightedMean,
+            Self::Pcf => Method::Polynomial,
+            Self::Sff => Method::Spline,
+            Self::MovingAverage => Method::MovingAverage,
+        }
+    }
+}
 
 /// Whether the velocity is the derivative of the position.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

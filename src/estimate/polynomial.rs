@@ -26,11 +26,14 @@ use crate::track::{Curve, State};
 /// Highest order: the paper's own highest.
 pub const MAX_ORDER: usize = 48;
 
-/// Third and higher derivatives are small at the end of the interval.
+/// At the end of the interval the acceleration dies away as exp(-t / tau), or stays: each derivative from the third
+/// on is that of this decay, within a standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prior {
     /// Standard deviation of the derivatives of order 3 and up, m/s^3, m/s^4, ...
     pub sigma: f64,
+    /// tau, s; `None` for an acceleration that stays.
+    pub decay_s: Option<f64>,
 }
 
 /// A fitted polynomial.
@@ -154,10 +157,13 @@ impl Scale {
                 data += 1;
             }
         }
-        if let Some(Prior { sigma }) = prior {
-            for derivative in 3..=self.order {
+        if let Some(Prior { sigma, decay_s }) = prior {
+            let at_end = |n, derivative: i32| end_derivative(n, derivative) / self.half_s.powi(derivative);
+            for derivative in 3..=self.order as i32 {
+                // the derivative of a exp(-t / tau), a the acceleration: a (-1 / tau)^(derivative - 2)
+                let share = decay_s.map_or(0.0, |tau| (-1.0 / tau).powi(derivative - 2));
                 let row: Vec<f64> = (skipped..=self.order)
-                    .map(|n| end_derivative(n, derivative) / self.half_s.powi(derivative as i32) / sigma)
+                    .map(|n| (at_end(n, derivative) - share * at_end(n, 2)) / sigma)
                     .collect();
                 problem.push(&row, 0.0);
             }
@@ -174,9 +180,9 @@ impl Scale {
 }
 
 /// The derivative of `T_n` of the given order at x = 1: the product of (n^2 - j^2) / (2 j + 1), j below it.
-fn end_derivative(n: usize, derivative: usize) -> f64 {
+fn end_derivative(n: usize, derivative: i32) -> f64 {
     let n = n as f64;
-    (0..derivative).map(|j| j as f64).map(|j| (n * n - j * j) / (2.0 * j + 1.0)).product()
+    (0..derivative).map(f64::from).map(|j| (n * n - j * j) / (2.0 * j + 1.0)).product()
 }
 
 impl Axis {
@@ -241,9 +247,21 @@ mod tests {
         }
     }
 
+    const FLAT: Prior = Prior { sigma: 1e-9, decay_s: None };
+
+    #[test]
+    fn an_acceleration_dies_away_as_the_prior_says() {
+        let dying = Prior { sigma: 1e-9, decay_s: Some(2.0) };
+        let fitted =
+            fit(&[cubic()], 100.0, 102.0, 4, Coefficients::Shared, Some(dying)).expect("a good problem");
+        let acceleration = |t| fitted.at(t).and_then(|s| s.acceleration).expect("a polynomial has one")[0];
+        let jerk = (acceleration(102.0 + 1e-4) - acceleration(102.0 - 1e-4)) / 2e-4;
+        assert!((jerk / acceleration(102.0) + 0.5).abs() < 1e-4, "{jerk}");
+    }
+
     #[test]
     fn a_tight_prior_leaves_a_parabola() {
-        let fitted = fit(&[cubic()], 100.0, 102.0, 4, Coefficients::Shared, Some(Prior { sigma: 1e-9 }));
+        let fitted = fit(&[cubic()], 100.0, 102.0, 4, Coefficients::Shared, Some(FLAT));
         let fitted = fitted.expect("a good problem");
         let acceleration = |t| fitted.at(t).and_then(|s| s.acceleration).expect("a polynomial has one")[0];
         assert!((acceleration(100.0) - acceleration(104.0)).abs() < 1e-6);

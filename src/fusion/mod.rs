@@ -13,16 +13,16 @@ mod pieces;
 use bands::{Bands, warn_of_disagreement, warn_of_misfit};
 use pieces::{Piece, fit_pieces};
 
-use crate::estimate::Coefficients;
 use crate::estimate::agreement::{self, Disagreement};
 use crate::estimate::characteristic_point::{self, CharacteristicPoint, Height};
 use crate::estimate::coverage::{self, Coverage};
-use crate::estimate::extrapolation::{self, Holdout};
+use crate::estimate::extrapolation::{self, Extrapolation, Holdout, Law, LawKind};
 use crate::estimate::{self, EstimateError};
+use crate::estimate::{Coefficients, Estimator};
 use crate::quality::{self, PhaseSummary};
 use crate::sample::Source;
 use crate::time::Time;
-use crate::track::{Curve, Method, Phase, Track, TrackPoint};
+use crate::track::{Curve, Phase, Track, TrackPoint};
 
 /// What is to be done, every default resolved.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,7 +36,7 @@ pub struct Plan {
     /// Index of the source whose errors are zero by definition.
     pub datum: usize,
     /// The estimator.
-    pub method: Method,
+    pub method: Estimator,
     /// SFF and PCF: whether velocity is the derivative of position.
     pub coefficients: Coefficients,
     /// SFF: knot spacing, s.
@@ -83,10 +83,19 @@ pub struct Fusion {
     pub disagreements: Vec<Disagreement>,
     /// What SFF chose, where SFF it was.
     pub spline: Option<SplineSummary>,
-    /// How the extrapolation did from earlier instants.
-    pub holdout: Option<Holdout>,
+    /// The laws that the track could be carried on by; the one that was taken stands first.
+    pub laws: Vec<TriedLaw>,
     /// What a person must read, a sentence each.
     pub warnings: Vec<String>,
+}
+
+/// A law, and how it did from earlier instants.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TriedLaw {
+    /// The law.
+    pub law: Law,
+    /// How it did.
+    pub holdout: Holdout,
 }
 
 /// Order of the extrapolation that `/fused/pcf` shows, and the number of last samples it is fitted to:
@@ -115,7 +124,7 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
         if seen.is_empty() {
             warnings.push(format!(
                 "{} gives no point between {:.2} s and {:.2} s after the origin: no source has a position there",
-                plan.method.name(),
+                plan.method.method().name(),
                 piece.from_s,
                 piece.to_s
             ));
@@ -123,8 +132,8 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
         last_s = seen.last().map_or(piece.to_s, |p| p.time.seconds_since(plan.origin));
         points.extend(seen);
     }
-    let (mut plain, mut holdout) = (Vec::new(), None);
-    if let Some((piece, settings)) = pieces.last().zip(plan.extrapolation) {
+    let (mut plain, mut laws) = (Vec::new(), Vec::new());
+    if let Some((piece, settings)) = pieces.last().zip(plan.extrapolation.as_ref()) {
         if settings.horizon_s > piece.to_s - piece.from_s {
             warnings.push(format!(
                 "the track is carried on {} s from {:.2} s that were seen: look at its band before you use it",
@@ -133,19 +142,31 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
             ));
         }
         let last = seeing_the_end(piece, &coverage);
-        let as_printed = extrapolation::Settings {
-            order: PLAIN_PCF.0,
-            window_s: last_samples_s(&last, piece.to_s, PLAIN_PCF.1),
-            prior: None,
-            ..settings
+        let carried = |made: &Extrapolation| carry_on(made, piece, settings.horizon_s, last_s, &bands, plan);
+        let extrapolate = |law: Law| {
+            let span_s = (piece.from_s, piece.to_s);
+            extrapolation::extrapolate(&last, &*piece.curve, span_s, law, settings.horizon_s)
         };
-        plain = carry_on(piece, &last, &as_printed, last_s, &bands, plan).map_or(Vec::new(), |made| made.0);
-        match carry_on(piece, &last, &settings, last_s, &bands, plan) {
-            Ok((carried, found)) => {
-                points.extend(carried);
-                holdout = Some(found);
+        let as_printed = Law {
+            kind: LawKind::Polynomial { order: PLAIN_PCF.0, prior: None },
+            window_s: last_samples_s(&last, piece.to_s, PLAIN_PCF.1),
+        };
+        plain = extrapolate(as_printed).as_ref().map_or(Vec::new(), carried);
+        let (mut made, mut failed) = (Vec::new(), Vec::new());
+        for &law in &settings.laws {
+            match extrapolate(law) {
+                Ok(extrapolation) => made.push(extrapolation),
+                Err(error) => failed.push(format!("{}: {error}", law.kind.name())),
             }
-            Err(error) => warnings.push(format!("the track is not extrapolated: {error}")),
+        }
+        if made.is_empty() {
+            warnings.push(format!("the track is not extrapolated: {}", failed.join("; ")));
+        }
+        if let Some(best) = extrapolation::best(&made) {
+            points.extend(carried(best));
+            let others = made.iter().filter(|e| e.law != best.law);
+            let tried = |e: &Extrapolation| TriedLaw { law: e.law, holdout: e.holdout };
+            laws = std::iter::once(best).chain(others).map(tried).collect();
         }
     }
 
@@ -160,7 +181,7 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
         spline: pieces.last().and_then(|p| p.spline),
         pieces: pieces.iter().map(|p| (p.from_s, p.to_s)).collect(),
         disagreements,
-        holdout,
+        laws,
         warnings,
     })
 }
@@ -173,7 +194,7 @@ fn observed(piece: &Piece, coverage: &Coverage, bands: &Bands, plan: &Plan) -> V
             time: plan.origin.plus_seconds(time_s),
             state: bands.widen(piece.curve.at(time_s)?, time_s, seen_by),
             phase: Coverage::phase(seen_by),
-            method: plan.method,
+            method: plan.method.method(),
             seen_by,
         })
     };
@@ -183,23 +204,21 @@ fn observed(piece: &Piece, coverage: &Coverage, bands: &Bands, plan: &Plan) -> V
     points
 }
 
-/// The points after a piece's last sample, on the grid that its last point, at `start_s`, is on; and how the
-/// extrapolation did from earlier instants.
+/// The points after a piece's last sample, on the grid that its last point, at `start_s`, is on.
 fn carry_on(
+    made: &Extrapolation,
     piece: &Piece,
-    sources: &[Source],
-    settings: &extrapolation::Settings,
+    horizon_s: f64,
     start_s: f64,
     bands: &Bands,
     plan: &Plan,
-) -> Result<(Vec<TrackPoint>, Holdout), EstimateError> {
-    let made = extrapolation::extrapolate(sources, &*piece.curve, piece.from_s, piece.to_s, settings)?;
+) -> Vec<TrackPoint> {
     let point = |time_s| {
         Some(TrackPoint {
             time: plan.origin.plus_seconds(time_s),
             state: bands.widen(made.at(time_s)?, time_s, 0),
             phase: Phase::Extrapolated,
-            method: Method::Polynomial,
+            method: made.law.kind.method(),
             seen_by: 0,
         })
     };
@@ -210,8 +229,8 @@ fn carry_on(
         above = plan.stop_z_m.is_some_and(|stop| p.state.position[2] >= stop);
         go_on
     };
-    let times = grid(start_s, piece.to_s + settings.horizon_s, plan.rate_hz).filter(|&t| t > piece.to_s);
-    Ok((times.map_while(point).take_while(below).collect(), made.holdout))
+    let times = grid(start_s, piece.to_s + horizon_s, plan.rate_hz).filter(|&t| t > piece.to_s);
+    times.map_while(point).take_while(below).collect()
 }
 
 /// The sources that see a piece's last instant: one that stopped earlier may disagree with them.

@@ -2,12 +2,13 @@
 
 use super::{Plan, SplineSummary, grid};
 use crate::estimate::EstimateError;
+use crate::estimate::Estimator;
 use crate::estimate::coverage::Coverage;
 use crate::estimate::moving_average::MovingAverage;
 use crate::estimate::weighted_mean::WeightedMean;
 use crate::estimate::{polynomial, spline};
 use crate::sample::{Quantity, Source};
-use crate::track::{Curve, Method};
+use crate::track::Curve;
 
 /// A fitted piece.
 pub(super) struct Piece {
@@ -41,7 +42,7 @@ pub(super) fn fit_pieces(
     match (fitted.is_empty(), first_error) {
         (true, Some(error)) => return Err(error),
         (true, None) => {
-            let what = plan.method.name().to_owned();
+            let what = plan.method.method().name().to_owned();
             return Err(EstimateError::TooFewSamples { what, needed: spline::MIN_SAMPLES, got: 0 });
         }
         _ => {}
@@ -71,11 +72,11 @@ type Fitted = (Box<dyn Curve>, Option<SplineSummary>);
 fn fit(sources: &[Source], from_s: f64, to_s: f64, plan: &Plan) -> Result<Fitted, EstimateError> {
     let got = instants(sources);
     if got < spline::MIN_SAMPLES {
-        let what = plan.method.name().to_owned();
+        let what = plan.method.method().name().to_owned();
         return Err(EstimateError::TooFewSamples { what, needed: spline::MIN_SAMPLES, got });
     }
     match plan.method {
-        Method::Spline => {
+        Estimator::Sff => {
             let settings = spline::Settings {
                 knot_spacing_s: plan.knot_spacing_s,
                 coefficients: plan.coefficients,
@@ -89,12 +90,12 @@ fn fit(sources: &[Source], from_s: f64, to_s: f64, plan: &Plan) -> Result<Fitted
             };
             Ok((Box::new(fitted), Some(summary)))
         }
-        Method::Polynomial => {
+        Estimator::Pcf => {
             let fitted = polynomial::fit(sources, from_s, to_s, plan.order, plan.coefficients, None)?;
             Ok((Box::new(fitted), None))
         }
-        Method::WeightedMean => Ok((Box::new(WeightedMean::new(sources.to_vec())), None)),
-        Method::MovingAverage => {
+        Estimator::Gdf => Ok((Box::new(WeightedMean::new(sources.to_vec())), None)),
+        Estimator::MovingAverage => {
             let mean = WeightedMean::new(sources.to_vec());
             let times = grid(from_s, to_s, plan.rate_hz);
             let average = MovingAverage::of(&mean, times, plan.window_points, 1.5 / plan.rate_hz)?;

@@ -15,7 +15,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::estimate::coverage;
-use crate::fusion::{Fusion, Plan};
+use crate::estimate::extrapolation::LawKind;
+use crate::fusion::{Fusion, Plan, TriedLaw};
 use crate::sample::Quantity;
 use crate::source::{Candidate, Loaded};
 use crate::time::Time;
@@ -166,18 +167,25 @@ pub struct SplineReport {
 /// How the track was carried on.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct ExtrapolationReport {
-    /// The method.
-    pub method: String,
-    /// Order of the polynomial.
-    pub order: usize,
-    /// Whether jerk and snap were kept small.
-    pub prior: bool,
-    /// Length of the stretch that it was fitted to, s.
-    pub window_s: f64,
     /// How far it was to go, s.
     pub horizon_s: f64,
     /// How far it went: less where it reached the height at which it stops, s.
     pub length_s: f64,
+    /// The laws that it could be carried on by; the one that was taken stands first.
+    pub laws: Vec<LawReport>,
+}
+
+/// A law that the track could be carried on by, and how it did from earlier instants.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct LawReport {
+    /// The method.
+    pub method: String,
+    /// Order, of a polynomial.
+    pub order: Option<usize>,
+    /// Whether the polynomial's acceleration was made to die away.
+    pub prior: bool,
+    /// Length of the stretch that it was fitted to, s.
+    pub window_s: f64,
     /// Root mean square 3-D position error of the same extrapolation from earlier instants, m.
     pub holdout_position_m: f64,
     /// The same of the velocity, m/s.
@@ -257,7 +265,7 @@ impl Report {
                 .collect(),
             unused_topics: unused.iter().map(|c| c.topic.clone()).collect(),
             track: TrackReport {
-                method: plan.method.name().into(),
+                method: plan.method.method().name().into(),
                 coefficients: plan.coefficients.name().into(),
                 frame_id: fusion.track.frame_id.clone(),
                 points: points.len(),
@@ -299,17 +307,12 @@ impl Report {
                 lambda: s.lambda,
                 noise_scale: s.noise_scale,
             }),
-            extrapolation: plan.extrapolation.zip(fusion.holdout).map(|(s, h)| ExtrapolationReport {
-                method: "pcf".into(),
-                order: s.order,
-                prior: s.prior.is_some(),
-                window_s: s.window_s,
-                horizon_s: s.horizon_s,
-                length_s: carried_s,
-                holdout_position_m: h.position_m,
-                holdout_velocity_m_s: h.velocity_m_s,
-                holdout_lead_s: h.lead_s,
-                holdout_trials: h.trials,
+            extrapolation: plan.extrapolation.as_ref().filter(|_| !fusion.laws.is_empty()).map(|settings| {
+                ExtrapolationReport {
+                    horizon_s: settings.horizon_s,
+                    length_s: carried_s,
+                    laws: fusion.laws.iter().map(LawReport::new).collect(),
+                }
             }),
             characteristic_points: fusion
                 .events
@@ -327,6 +330,26 @@ impl Report {
                 })
                 .collect(),
             warnings: warnings.to_vec(),
+        }
+    }
+}
+
+impl LawReport {
+    fn new(tried: &TriedLaw) -> Self {
+        let (order, prior) = match tried.law.kind {
+            LawKind::Polynomial { order, prior } => (Some(order), prior.is_some()),
+            LawKind::Drag => (None, false),
+        };
+        let h = tried.holdout;
+        Self {
+            method: tried.law.kind.name().into(),
+            order,
+            prior,
+            window_s: tried.law.window_s,
+            holdout_position_m: h.position_m,
+            holdout_velocity_m_s: h.velocity_m_s,
+            holdout_lead_s: h.lead_s,
+            holdout_trials: h.trials,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Write};
 
-use super::Report;
+use super::{ExtrapolationReport, Report};
 use crate::printable::printable;
 
 /// The report as text. It doesn't name the files, which may change without the track changing.
@@ -43,25 +43,7 @@ fn write_page(out: &mut String, report: &Report) -> fmt::Result {
         )?;
     }
     if let Some(e) = &report.extrapolation {
-        writeln!(
-            out,
-            "        carried on {:.2} s{} by {} of order {}{}, fitted to the last {:.2} s; {} trials {:.2} s ahead: \
-             {:.2} m, {:.2} m/s off",
-            e.length_s,
-            if e.length_s + 1.5 / track.rate_hz < e.horizon_s {
-                " (to the height where it stops)"
-            } else {
-                ""
-            },
-            e.method.to_uppercase(),
-            e.order,
-            if e.prior { " with a prior on jerk and snap" } else { "" },
-            e.window_s,
-            e.holdout_trials,
-            e.holdout_lead_s,
-            e.holdout_position_m,
-            e.holdout_velocity_m_s
-        )?;
+        extrapolation(out, e, track.rate_hz)?;
     }
     writeln!(out)?;
     phases(out, report)?;
@@ -78,6 +60,29 @@ pub(super) fn warnings(out: &mut String, warnings: &[String]) -> fmt::Result {
         writeln!(out)?;
     }
     warnings.iter().try_for_each(|warning| writeln!(out, "warning: {}", printable(warning)))
+}
+
+fn extrapolation(out: &mut String, e: &ExtrapolationReport, rate_hz: f64) -> fmt::Result {
+    let early = if e.length_s + 1.5 / rate_hz < e.horizon_s { " (to the height where it stops)" } else { "" };
+    write!(out, "        carried on {:.2} s{early}", e.length_s)?;
+    for (i, law) in e.laws.iter().enumerate() {
+        let name = match (law.order, law.prior) {
+            (None, _) => "the law of drag".to_owned(),
+            (Some(order), true) => format!("PCF of order {order} with a prior"),
+            (Some(order), false) => format!("PCF of order {order}"),
+        };
+        let by = if i == 0 { " by" } else { ";\n        not by" };
+        write!(
+            out,
+            "{by} {name}, fitted to the last {:.2} s: {:.2} m, {:.2} m/s off in {} trials {:.2} s ahead",
+            law.window_s,
+            law.holdout_position_m,
+            law.holdout_velocity_m_s,
+            law.holdout_trials,
+            law.holdout_lead_s
+        )?;
+    }
+    writeln!(out)
 }
 
 fn sources(out: &mut String, report: &Report) -> fmt::Result {

@@ -1,44 +1,88 @@
-//! The track beyond the last sample: a polynomial fitted to the last stretch, carried on.
+//! The track beyond the last sample: a law of motion fitted to the last stretch, carried on.
 //!
 //! Zhang 2025 fits an order-4 PCF to the last 46 samples and carries it 100 samples on. Plain least squares
 //! does that for a moment only: the errors of its jerk and snap grow with t^3 and t^4. With a [`Prior`]
-//! that keeps both small it holds several times longer.
+//! that lets the acceleration die away, as that of a body in water does, it holds several times longer. The other law
+//! is that body's own: constant force and quadratic [`drag`].
 //!
-//! The band. What a polynomial gets wrong is the future acceleration. Take that as white noise of density q
+//! The band. What a law gets wrong is the future acceleration. Take that as white noise of density q
 //! (m^2/s^3) from the last sample on: the velocity's variance grows by q h, the position's by q h^3 / 3 at a
 //! lead h, beside the fit's own. q is found by maximum likelihood from *rolling origins*: the same
-//! extrapolation from six earlier instants, held against the curve that the later samples gave.
+//! extrapolation from six earlier instants, held against the curve that the later samples gave. They also say which of
+//! several laws does better on this log.
+
+mod drag;
 
 use super::Coefficients;
 use super::EstimateError;
-use super::polynomial::{self, Polynomial, Prior};
+use super::polynomial::{self, Prior};
 use crate::math::scalar;
 use crate::sample::Source;
-use crate::track::{Curve, State};
+use crate::track::{Curve, Method, State};
 
 /// What may be chosen.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Order of the polynomial.
-    pub order: usize,
-    /// Length of the stretch that it is fitted to, s.
-    pub window_s: f64,
-    /// The constraint on jerk and snap; `None` for the paper's plain least squares.
-    pub prior: Option<Prior>,
+    /// The candidates; of several the one that does better from earlier instants is taken.
+    pub laws: Vec<Law>,
     /// How far to go, s.
     pub horizon_s: f64,
+}
+
+/// A law of motion, and the stretch that it is fitted to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Law {
+    /// Which.
+    pub kind: LawKind,
+    /// Length of the stretch, s.
+    pub window_s: f64,
+}
+
+/// What moves the vehicle on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LawKind {
+    /// A polynomial of this order (PCF); without a prior the paper's plain least squares.
+    Polynomial {
+        /// Its order.
+        order: usize,
+        /// The constraint on jerk and snap.
+        prior: Option<Prior>,
+    },
+    /// Constant force and quadratic drag.
+    Drag,
+}
+
+impl LawKind {
+    /// Its name in reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.method().name()
+    }
+
+    /// The method of the points that it makes.
+    #[must_use]
+    pub fn method(self) -> Method {
+        match self {
+            Self::Polynomial { .. } => Method::Polynomial,
+            Self::Drag => Method::Drag,
+        }
+    }
 }
 
 /// Earlier instants that the same extrapolation is tried from.
 const ORIGINS: usize = 6;
 
+/// The farthest lead at which it is tried, s: farther back the vehicle may still be driven.
+const TRIED_S: f64 = 1.4;
+
 /// Leads at which each trial is held against the curve.
 const LEADS: usize = 4;
 
-/// A polynomial carried on, with a band that grows.
-#[derive(Clone, Debug)]
+/// A law carried on, with a band that grows.
 pub struct Extrapolation {
-    polynomial: Polynomial,
+    /// The law.
+    pub law: Law,
+    fitted: Box<dyn Curve>,
     /// The last sample's time, s.
     pub from_s: f64,
     /// Density q of the acceleration's error by axis, m^2/s^3.
@@ -68,28 +112,34 @@ struct Miss {
     truth: State,
 }
 
-/// Fits the last `window_s` before `to_s` and judges it on the stretch of `curve` before that.
+/// Fits `law` to the last stretch before `to_s`, to be carried `horizon_s` on, and judges it on the stretch of
+/// `curve` before that.
 ///
 /// # Errors
-/// Those of the polynomial's fit; [`EstimateError::TooFewSamples`] where the curve, which begins at
+/// Those of the law's fit; [`EstimateError::TooFewSamples`] where the curve, which begins at
 /// `from_s`, is too short for a single trial, so that nobody could say how far off the result is.
 pub fn extrapolate(
     sources: &[Source],
     curve: &dyn Curve,
-    from_s: f64,
-    to_s: f64,
-    settings: &Settings,
+    (from_s, to_s): (f64, f64),
+    law: Law,
+    horizon_s: f64,
 ) -> Result<Extrapolation, EstimateError> {
-    let fit = |end_s: f64| {
-        let (order, prior) = (settings.order, settings.prior);
-        polynomial::fit(sources, end_s - settings.window_s, end_s, order, Coefficients::Shared, prior)
+    let fit = |end_s: f64, reach_s: f64| -> Result<Box<dyn Curve>, EstimateError> {
+        let start_s = end_s - law.window_s;
+        Ok(match law.kind {
+            LawKind::Polynomial { order, prior } => {
+                Box::new(polynomial::fit(sources, start_s, end_s, order, Coefficients::Shared, prior)?)
+            }
+            LawKind::Drag => Box::new(drag::fit(sources, start_s, end_s, reach_s)?),
+        })
     };
-    let polynomial = fit(to_s)?;
-    let reach = settings.horizon_s.min(settings.window_s).min(0.5 * (to_s - from_s));
+    let fitted = fit(to_s, horizon_s)?;
+    let reach = horizon_s.min(TRIED_S).min(0.5 * (to_s - from_s));
     let mut misses = Vec::new();
     for origin in 1..=ORIGINS {
         let origin_s = to_s - reach * origin as f64 / ORIGINS as f64;
-        if let Ok(trial) = fit(origin_s) {
+        if let Ok(trial) = fit(origin_s, to_s - origin_s) {
             for lead in 1..=LEADS {
                 let lead_s = (to_s - origin_s) * lead as f64 / LEADS as f64;
                 let time_s = (origin_s + lead_s).min(to_s);
@@ -106,7 +156,14 @@ pub fn extrapolate(
         });
     }
     let acceleration_density = std::array::from_fn(|axis| density(&misses, axis));
-    Ok(Extrapolation { polynomial, from_s: to_s, acceleration_density, holdout: holdout(&misses) })
+    Ok(Extrapolation { law, fitted, from_s: to_s, acceleration_density, holdout: holdout(&misses) })
+}
+
+/// The best of several by the trials from earlier instants: the first of those that are equally far off.
+#[must_use]
+pub fn best<'a>(candidates: impl IntoIterator<Item = &'a Extrapolation>) -> Option<&'a Extrapolation> {
+    let off = |e: &Extrapolation| e.holdout.position_m;
+    candidates.into_iter().reduce(|best, next| if off(next) < off(best) { next } else { best })
 }
 
 /// The density q of greatest likelihood on one axis, m^2/s^3.
@@ -144,7 +201,7 @@ fn holdout(misses: &[Miss]) -> Holdout {
 impl Curve for Extrapolation {
     fn at(&self, time_s: f64) -> Option<State> {
         let lead = time_s - self.from_s;
-        let mut state = self.polynomial.at(time_s).filter(|_| lead >= 0.0)?;
+        let mut state = self.fitted.at(time_s).filter(|_| lead >= 0.0)?;
         for (axis, q) in self.acceleration_density.into_iter().enumerate() {
             state.position_sigma[axis] = state.position_sigma[axis].hypot((q * lead.powi(3) / 3.0).sqrt());
             state.velocity_sigma[axis] = state.velocity_sigma[axis].hypot((q * lead).sqrt());
@@ -170,19 +227,20 @@ mod tests {
         Source { name: "test".into(), positions: series(&|t| z(t).0), velocities: series(&|t| z(t).1) }
     }
 
-    const SETTINGS: Settings =
-        Settings { order: 4, window_s: 1.4, prior: Some(Prior { sigma: 0.5 }), horizon_s: 2.0 };
+    const PRIOR: Prior = Prior { sigma: 0.25, decay_s: None };
+    const PCF: Law = Law { kind: LawKind::Polynomial { order: 4, prior: Some(PRIOR) }, window_s: 1.4 };
+    const DRAG: Law = Law { kind: LawKind::Drag, window_s: 0.9 };
 
-    fn run(source: Source, settings: &Settings) -> Result<Extrapolation, EstimateError> {
+    fn run(source: Source, law: Law) -> Result<Extrapolation, EstimateError> {
         let end = source.span_s().map_or(0.0, |s| s.1);
         let sources = vec![source];
         let curve = WeightedMean::new(sources.clone());
-        extrapolate(&sources, &curve, 0.0, end, settings)
+        extrapolate(&sources, &curve, (0.0, end), law, 2.0)
     }
 
     #[test]
     fn uniform_acceleration_is_carried_on_with_a_narrow_band() {
-        let found = run(source(4.0, |t| (0.5 * t * t, t)), &SETTINGS).expect("long enough");
+        let found = run(source(4.0, |t| (0.5 * t * t, t)), PCF).expect("long enough");
         let state = found.at(6.0).expect("beyond the end");
         assert!((state.position[0] - 18.0).abs() < 1e-3 && (state.velocity[0] - 6.0).abs() < 1e-3);
         assert!(state.position_sigma[0] < 0.4, "{}", state.position_sigma[0]);
@@ -192,7 +250,7 @@ mod tests {
     #[test]
     fn a_motion_that_polynomials_follow_badly_gets_a_band_that_says_so() {
         let wave = |t: f64| (2.0 * (3.0 * t).sin(), 6.0 * (3.0 * t).cos());
-        let found = run(source(6.0, wave), &SETTINGS).expect("long enough");
+        let found = run(source(6.0, wave), PCF).expect("long enough");
         for lead in [0.3, 1.0, 2.0] {
             let state = found.at(6.0 + lead).expect("beyond the end");
             let error = (state.position[0] - wave(6.0 + lead).0).abs();
@@ -204,6 +262,30 @@ mod tests {
 
     #[test]
     fn a_track_too_short_to_judge_is_not_extrapolated() {
-        assert!(run(source(0.1, |t| (t, 1.0)), &Settings { order: 12, ..SETTINGS }).is_err());
+        assert!(run(source(0.04, |t| (t, 1.0)), PCF).is_err());
+    }
+
+    #[test]
+    fn the_law_that_did_better_on_this_log_is_taken() {
+        // slowed by drag alone: v = 1 / (1/15 + k t), 20 m/s^2 at first
+        let slowed = |t: f64| ((1.0 + 1.5 * t).ln() / 0.1, 1.0 / (1.0 / 15.0 + 0.1 * t));
+        let vertical = |s: Source| Source {
+            positions: s.positions.iter().map(|p| Sample { value: [0.0, 0.0, p.value[2]], ..*p }).collect(),
+            velocities: s.velocities.iter().map(|p| Sample { value: [0.0, 0.0, p.value[2]], ..*p }).collect(),
+            ..s
+        };
+        let both = [PCF, DRAG].map(|law| run(vertical(source(3.0, slowed)), law).expect("long enough"));
+        assert_eq!(best(&both).map(|b| b.law.kind), Some(LawKind::Drag));
+        let off = |e: &Extrapolation| (e.at(5.0).expect("ahead").position[2] - slowed(5.0).0).abs();
+        assert!(
+            off(&both[1]) < 0.05 && off(&both[0]) > 2.0 * off(&both[1]),
+            "{} {}",
+            off(&both[0]),
+            off(&both[1])
+        );
+        let thrown = |t: f64| (15.0 * t - 4.9 * t * t, 15.0 - 9.8 * t);
+        let fitted: Vec<_> =
+            [DRAG, PCF].into_iter().filter_map(|law| run(source(3.0, thrown), law).ok()).collect();
+        assert_eq!(best(&fitted).map(|b| b.law), Some(PCF));
     }
 }
