@@ -1,9 +1,9 @@
 //! How good a track is: how far the samples lie from it, phase by phase, and how sure it is of itself.
 
 use crate::estimate::coverage::Coverage;
-use crate::sample::{Quantity, Source};
+use crate::sample::{Sample, Source};
 use crate::time::Time;
-use crate::track::{Curve, Phase, State, Track, TrackPoint};
+use crate::track::{Curve, Phase, Track, TrackPoint};
 
 /// One kind of stretch of the track, summed over the log.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,14 +25,56 @@ pub struct PhaseSummary {
     pub stretches: usize,
 }
 
-/// Sums up the track and the samples' distances from it, phase by phase, in order of first appearance.
+/// How far one sample lies from the track.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Deviation {
+    /// Sample less track, m or m/s.
+    pub vector: [f64; 3],
+    /// The same over the sample's standard deviations, root mean square of the three axes.
+    pub normalised: f64,
+}
+
+/// How far what a source measured at one instant lies from the track.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Residual {
+    /// The instant.
+    pub time: Time,
+    /// Index of the source.
+    pub source: usize,
+    /// Of its position and of its velocity, where it measured one and the track reaches.
+    pub deviations: [Option<Deviation>; 2],
+    /// The sources that see this instant: bit i is the i-th.
+    pub seen_by: u32,
+}
+
+/// The residuals of all samples of the fitted pieces, in order of time and then of sources.
 #[must_use]
-pub fn phases(
-    track: &Track,
-    origin: Time,
-    pieces: &[(&[Source], &dyn Curve)],
-    coverage: &Coverage,
-) -> Vec<PhaseSummary> {
+pub fn residuals(pieces: &[(&[Source], &dyn Curve)], origin: Time, coverage: &Coverage) -> Vec<Residual> {
+    let mut residuals = Vec::new();
+    for (sources, curve) in pieces {
+        for (source, samples) in sources.iter().enumerate() {
+            for (position, velocity) in samples.instants() {
+                let Some(time_s) = position.or(velocity).map(|s| s.time_s) else { continue };
+                let Some(state) = curve.at(time_s) else { continue };
+                residuals.push(Residual {
+                    time: origin.plus_seconds(time_s),
+                    source,
+                    deviations: [
+                        position.map(|sample| deviation(sample, state.position)),
+                        velocity.map(|sample| deviation(sample, state.velocity)),
+                    ],
+                    seen_by: coverage.seen_by(time_s),
+                });
+            }
+        }
+    }
+    residuals.sort_by_key(|r| (r.time, r.source));
+    residuals
+}
+
+/// Sums up the track and the residuals, phase by phase, in order of first appearance.
+#[must_use]
+pub fn phases(track: &Track, origin: Time, residuals: &[Residual]) -> Vec<PhaseSummary> {
     let mut summaries: Vec<PhaseSummary> = Vec::new();
     for stretch in track.points.chunk_by(|a, b| (a.phase, a.seen_by) == (b.phase, b.seen_by)) {
         let TrackPoint { phase, seen_by, time: from, .. } = stretch[0];
@@ -62,21 +104,15 @@ pub fn phases(
         }
     }
     let mut sums = vec![[(0.0, 0_usize); 2]; summaries.len()];
-    for (sources, curve) in pieces {
-        for sample in sources.iter().flat_map(|s| Quantity::ALL.map(|q| (q, s.series(q)))) {
-            let (quantity, series) = sample;
-            for sample in series {
-                let seen_by = coverage.seen_by(sample.time_s);
-                let phase = Coverage::phase(seen_by);
-                let Some(index) = summaries.iter().position(|s| s.phase == phase && s.seen_by == seen_by)
-                else {
-                    continue;
-                };
-                if let Some(state) = curve.at(sample.time_s) {
-                    let sum = &mut sums[index][quantity as usize];
-                    sum.0 += norm_squared(residual(sample.value, &state, quantity)); // (12)
-                    sum.1 += 1;
-                }
+    for residual in residuals {
+        let (phase, seen_by) = (Coverage::phase(residual.seen_by), residual.seen_by);
+        let Some(index) = summaries.iter().position(|s| (s.phase, s.seen_by) == (phase, seen_by)) else {
+            continue;
+        };
+        for (sum, deviation) in sums[index].iter_mut().zip(residual.deviations) {
+            if let Some(deviation) = deviation {
+                sum.0 += norm_squared(deviation.vector); // (12)
+                sum.1 += 1;
             }
         }
     }
@@ -87,12 +123,10 @@ pub fn phases(
     summaries
 }
 
-fn residual(value: [f64; 3], state: &State, quantity: Quantity) -> [f64; 3] {
-    let fitted = match quantity {
-        Quantity::Position => state.position,
-        Quantity::Velocity => state.velocity,
-    };
-    std::array::from_fn(|i| value[i] - fitted[i])
+fn deviation(sample: &Sample, fitted: [f64; 3]) -> Deviation {
+    let vector: [f64; 3] = std::array::from_fn(|i| sample.value[i] - fitted[i]);
+    let in_sigmas: [f64; 3] = std::array::from_fn(|i| vector[i] / sample.sigma[i]);
+    Deviation { vector, normalised: (norm_squared(in_sigmas) / 3.0).sqrt() }
 }
 
 fn norm_squared(v: [f64; 3]) -> f64 {

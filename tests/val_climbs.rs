@@ -6,6 +6,8 @@ use std::process::Command;
 
 use serde_json::Value;
 
+mod viewer_rules;
+
 /// Truth at 100 Hz: time since the log's zero, position, velocity.
 struct Truth {
     epoch_ns: i64,
@@ -72,6 +74,7 @@ fn judge(data: &Path, family: &str) -> ([Sum; 2], Vec<i32>) {
             .output()
             .expect("the program runs");
         codes.push(ran.status.code().expect("it ends by itself"));
+        viewer_rules::assert_shown(&output);
         let truth = Truth::read(&stem);
         for message in mcap::MessageStream::new(&fs::read(&output).expect("an output")).expect("an MCAP") {
             let message = message.expect("a message");
