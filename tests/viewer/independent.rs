@@ -19,7 +19,8 @@ fn an_independent_check_finds_nothing_wrong_with_the_fused_sample_logs_and_somet
     };
     let check = |log: &Path| {
         let ran = Command::new("node").arg(&script).arg(log).output().expect("node");
-        (ran.status.code(), String::from_utf8(ran.stdout).unwrap())
+        let said = [ran.stdout, ran.stderr].concat();
+        (ran.status.code(), String::from_utf8(said).unwrap())
     };
     for name in NAMES {
         let (code, said) = check(&fused(name));
