@@ -2,7 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::config::TimeChoice;
+use crate::estimate::characteristic_point::Height;
 
 /// Where was the vehicle really? Reads an MCAP recording of a sea trial, fuses its position and velocity
 /// channels into one 3-D track, and writes that track back beside them.
@@ -22,6 +25,13 @@ pub enum Command {
     /// The original is never touched: the output is a new log whose data section begins with every byte of
     /// the original's.
     Fuse(Fuse),
+    /// Hold a track against a reference channel of the same log
+    ///
+    /// Errors phase by phase and at characteristic points (Zhang 2025, eq. 12 and 13), 3-D and by axis, and
+    /// whether the track's 95 % bands hold the reference.
+    Compare(Compare),
+    /// Get a track out of a log, as a table
+    Export(Export),
     /// Make a log with known truth from a scenario file
     Simulate(Simulate),
 }
@@ -79,4 +89,66 @@ pub struct Simulate {
     /// How to talk.
     #[command(flatten)]
     pub voice: Voice,
+}
+
+/// Arguments of `compare`.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  trackfuse compare dive.fused.mcap --reference /ins/odom
+  trackfuse compare dive.fused.mcap --reference /ins/pose.position --reference /ins/twist.linear
+  trackfuse compare dive.mcap --estimate /beacon/track --reference /ins/odom   a sensor instead of a track")]
+pub struct Compare {
+    /// The log that holds both
+    pub log: PathBuf,
+    /// Topic of the track
+    #[arg(long, value_name = "TOPIC", default_value = "/fused/track")]
+    pub estimate: String,
+    /// Topic of the reference, or message paths of its position and of its velocity
+    #[arg(long, value_name = "TOPIC", required = true)]
+    pub reference: Vec<String>,
+    /// What counts as a reference sample's time [default: its stamp, else publish, else log time]
+    #[arg(long, value_enum, value_name = "CLOCK")]
+    pub reference_time: Option<TimeChoice>,
+    /// A further height to compare at, such as exit=-2, in metres, Z up [default: those on the events topic]
+    #[arg(long, value_name = "NAME=Z", value_parser = height, allow_hyphen_values = true)]
+    pub height: Vec<Height>,
+    /// How to talk.
+    #[command(flatten)]
+    pub voice: Voice,
+}
+
+fn height(text: &str) -> Result<Height, String> {
+    let expected = || format!("expected NAME=Z, such as exit=-2, got {text:?}");
+    let (name, z) = text.split_once('=').ok_or_else(expected)?;
+    let z_m: f64 = z.trim().parse().map_err(|_| expected())?;
+    if z_m.is_finite() { Ok(Height { name: name.trim().to_owned(), z_m }) } else { Err(expected()) }
+}
+
+/// Arguments of `export`.
+#[derive(Args, Debug)]
+pub struct Export {
+    /// The log to read
+    pub log: PathBuf,
+    /// Topic of the track; a channel with a position will do too
+    #[arg(long, value_name = "TOPIC", default_value = "/fused/track")]
+    pub topic: String,
+    /// Format of the table
+    #[arg(long, value_enum, default_value = "csv")]
+    pub format: Format,
+    /// The file to write [default: stdout]
+    #[arg(long, short, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Replace an existing output
+    #[arg(long)]
+    pub force: bool,
+    /// How to talk.
+    #[command(flatten)]
+    pub voice: Voice,
+}
+
+/// Formats of a table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// Comma-separated values; every column's name holds its unit
+    Csv,
 }

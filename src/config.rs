@@ -157,7 +157,7 @@ pub enum Axes {
 }
 
 /// What counts as a sample's time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum TimeChoice {
     /// The stamp in the message.

@@ -9,6 +9,8 @@ use trackfuse::commands;
 fn main() -> ExitCode {
     let done = match &Cli::parse().command {
         Command::Fuse(args) => commands::fuse(args),
+        Command::Compare(args) => commands::compare(args),
+        Command::Export(args) => commands::export(args),
         Command::Simulate(args) => commands::simulate(args),
     };
     match done {

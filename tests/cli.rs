@@ -10,7 +10,9 @@ mod viewer_rules;
 
 mod cli {
     mod bad_input;
+    mod compare;
     mod exit_code;
+    mod export;
     mod output;
     mod readme;
     mod real_logs;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 const WALLS: [(&str, &[&str]); 11] = [
     ("src/sample.rs", &["crate::", "mcap", "std::fs"]),
     ("src/track.rs", &["crate::log", "crate::estimate", "mcap", "std::fs"]),
-    ("src/quality.rs", &["crate::log", "crate::commands", "crate::config", "mcap", "std::fs"]),
+    ("src/quality", &["crate::log", "crate::commands", "crate::config", "mcap", "std::fs"]),
     ("src/source", &["crate::commands", "crate::fusion", "crate::report", "clap", "std::fs"]),
     (
         "src/math",

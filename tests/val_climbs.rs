@@ -1,128 +1,71 @@
-//! `fuse` held against the truth of climbs that another simulator made: nine families, four runs each.
+//! Fusion held against the truth of climbs: a sample of the study in `examples/study`, and logs that another
+//! simulator made.
 
-use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::Command;
+#[path = "../examples/study/climbs.rs"]
+mod climbs;
+#[path = "../examples/study/family.rs"]
+mod family;
 
-use serde_json::Value;
+use std::path::PathBuf;
 
-mod viewer_rules;
+use family::{Family, METHODS, Part, Pool};
 
-/// Truth at 100 Hz: time since the log's zero, position, velocity.
-struct Truth {
-    epoch_ns: i64,
-    rows: Vec<Vec<f64>>,
+fn method(family: &Family, name: &str, part: Part) -> [Pool; 2] {
+    let index = METHODS.iter().position(|(n, _)| *n == name).expect("a method of the tables");
+    family.pools[index][part as usize].clone()
 }
 
-impl Truth {
-    fn read(stem: &Path) -> Self {
-        let json: Value =
-            serde_json::from_slice(&fs::read(stem.with_extension("truth.json")).expect("truth"))
-                .expect("json");
-        let csv = fs::read_to_string(stem.with_extension("truth.csv")).expect("truth");
-        let row = |line: &str| line.split(',').map(|v| v.parse().expect("a number")).collect();
-        Self {
-            epoch_ns: json["epoch_ns"].as_i64().expect("a number"),
-            rows: csv.lines().skip(1).map(row).collect(),
+/// What holds for climbs of either simulator.
+fn check(families: &[Family]) {
+    for family in families {
+        let name = &family.name;
+        let seen = [Part::Tether, Part::Overlap, Part::Beacon].map(|part| method(family, "SFF", part));
+        let [unseen, _] = method(family, "SFF", Part::Unseen);
+        let positions = || seen.iter().map(|[position, _]| position);
+        let worst_m = positions().filter_map(Pool::rmse).fold(0.0, f64::max);
+        let least = positions().filter_map(Pool::inside).fold(1.0, f64::min);
+        if ["single", "no_error"].contains(&name.as_str()) {
+            assert_eq!(family.warned, 0, "{name}");
+            assert!(worst_m < 0.06, "{name}: {worst_m} m");
+            assert!(unseen.rmse().expect("carried on") < 1.5, "{name} unseen: {:?} m", unseen.rmse());
+            assert!(least > 0.9, "{name}: {least} inside the bands");
+        } else {
+            // a bias may happen to be below its noise
+            assert!(
+                4 * family.warned >= 3 * family.runs,
+                "{name}: {} of {} runs warn",
+                family.warned,
+                family.runs
+            );
+            assert!(worst_m < 3.5, "{name}: {worst_m} m");
+            assert!(least > 0.85, "{name}: {least} inside the bands");
         }
+        assert!(unseen.inside().is_none_or(|share| share > 0.9), "{name} unseen: {:?}", unseen.inside());
+        // The tether's noise of 0.1 m an axis is all that the weighted mean has where it alone sees; with
+        // outliers, and where the second sensor of `single` is the only one, it is another.
+        let [gdf, _] = method(family, "GDF", Part::Tether);
+        let plain = !["outliers", "single"].contains(&name.as_str());
+        let gdf_m = gdf.rmse().expect("seen");
+        assert!(!plain || (0.15..0.19).contains(&gdf_m), "{name}: GDF {gdf_m} m");
     }
-
-    fn position(&self, t_s: f64) -> Option<[f64; 3]> {
-        let next = self.rows.partition_point(|r| r[0] < t_s);
-        let (a, b) = (self.rows.get(next.checked_sub(1)?)?, self.rows.get(next)?);
-        let share = (t_s - a[0]) / (b[0] - a[0]);
-        Some(std::array::from_fn(|i| a[1 + i] + share * (b[1 + i] - a[1 + i])))
-    }
-}
-
-/// What one kind of phase adds up to over a family.
-#[derive(Default)]
-struct Sum {
-    squares: f64,
-    points: usize,
-    inside: usize,
-    /// Numbers that the track says how sure it is of.
-    banded: usize,
-}
-
-impl Sum {
-    fn rmse_m(&self) -> f64 {
-        (self.squares / self.points as f64).sqrt()
-    }
-
-    fn coverage(&self) -> f64 {
-        self.inside as f64 / self.banded as f64
-    }
-}
-
-fn vector(value: &Value) -> Option<[f64; 3]> {
-    Some([value["x"].as_f64()?, value["y"].as_f64()?, value["z"].as_f64()?])
-}
-
-/// Seen and unseen parts of the four runs of a family, and the runs' exit codes.
-fn judge(data: &Path, family: &str) -> ([Sum; 2], Vec<i32>) {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let (mut sums, mut codes) = ([Sum::default(), Sum::default()], Vec::new());
-    for run in 0..4 {
-        let stem: PathBuf = data.join(format!("climbs/{family}_{run}"));
-        let output = folder.path().join(format!("{run}.mcap"));
-        let ran = Command::new(env!("CARGO_BIN_EXE_trackfuse"))
-            .args(["fuse", "--quiet"])
-            .arg(stem.with_extension("mcap"))
-            .arg("-o")
-            .arg(&output)
-            .output()
-            .expect("the program runs");
-        codes.push(ran.status.code().expect("it ends by itself"));
-        viewer_rules::assert_shown(&output);
-        let truth = Truth::read(&stem);
-        for message in mcap::MessageStream::new(&fs::read(&output).expect("an output")).expect("an MCAP") {
-            let message = message.expect("a message");
-            if message.channel.topic != "/fused/track" {
-                continue;
-            }
-            let point: Value = serde_json::from_slice(&message.data).expect("json");
-            let t_s = (message.log_time as i64 - truth.epoch_ns) as f64 * 1e-9;
-            let Some(expected) = truth.position(t_s) else { continue };
-            let position = vector(&point["position"]).expect("a position");
-            let sum = &mut sums[usize::from(point["phase"] == "extrapolated")];
-            sum.points += 1;
-            for axis in 0..3 {
-                let error = position[axis] - expected[axis];
-                sum.squares += error * error;
-                if let Some(sigma) = vector(&point["position_sigma"]) {
-                    sum.banded += 1;
-                    sum.inside += usize::from(error.abs() < 1.96 * sigma[axis]);
-                }
-            }
-        }
-    }
-    (sums, codes)
 }
 
 #[test]
 fn honest_sensors_give_centimetres_and_no_warning_and_biased_ones_a_warning_and_bands_that_hold() {
+    let families = trackfuse::simulate::FAMILIES.map(|name| Family::judge(name, climbs::simulated(name, 8)));
+    check(&families);
+}
+
+#[test]
+fn climbs_of_another_simulator_give_the_same() {
     let Some(data) = std::env::var_os("TRACKFUSE_TEST_DATA").map(PathBuf::from) else {
         // past the test runner, which would keep it to itself
         let _ =
             std::io::Write::write_all(&mut std::io::stderr(), b"skipped: TRACKFUSE_TEST_DATA is not set\n");
         return;
     };
-    for family in ["single", "no_error"] {
-        let ([seen, unseen], codes) = judge(&data, family);
-        assert_eq!(codes, [0; 4], "{family}");
-        assert!(seen.rmse_m() < 0.045, "{family}: {} m", seen.rmse_m());
-        assert!(unseen.rmse_m() < 1.0, "{family} unseen: {} m", unseen.rmse_m());
-        assert!(seen.coverage() > 0.93 && unseen.coverage() > 0.93, "{family}: {}", seen.coverage());
-    }
-    for family in ["nominal", "async", "outliers", "dropout", "gap", "bigtau", "drift"] {
-        let ([seen, unseen], codes) = judge(&data, family);
-        // of the runs with dropouts, one happens to have a bias below its noise
-        let silent = codes.iter().filter(|&&code| code == 0).count();
-        assert!(silent <= usize::from(family == "dropout"), "{family}: {codes:?}");
-        assert!(codes.iter().all(|code| [0, 3].contains(code)), "{family}: {codes:?}");
-        assert!(seen.rmse_m() < 2.0, "{family}: {} m", seen.rmse_m());
-        assert!(seen.coverage() > 0.85, "{family}: {} inside the bands", seen.coverage());
-        assert!(unseen.banded == 0 || unseen.coverage() > 0.9, "{family} unseen: {}", unseen.coverage());
-    }
+    let recorded = |name: &str| Family::judge(name, climbs::recorded(&data.join("climbs"), name));
+    let families = trackfuse::simulate::FAMILIES.map(recorded);
+    assert!(families.iter().all(|family| family.runs == 4));
+    check(&families);
 }

@@ -1,8 +1,12 @@
 //! The commands: each holds the order of its steps, and nothing else.
 
+mod compare;
+mod export;
 mod fuse;
 mod simulate;
 
+pub use compare::compare;
+pub use export::export;
 pub use fuse::fuse;
 pub use simulate::simulate;
 
@@ -55,6 +59,20 @@ pub enum CommandError {
         /// The first such point.
         time: Time,
     },
+    /// A track and its reference share no instant.
+    #[error("the track and the reference have no instant in common: {estimate} and {reference} since T0")]
+    NothingInCommon {
+        /// When the track is known.
+        estimate: String,
+        /// When the reference is.
+        reference: String,
+    },
+    /// The result can't be printed.
+    #[error("stdout: {source}")]
+    Stdout {
+        /// What the system said.
+        source: io::Error,
+    },
     /// A scenario, with its file.
     #[error("{path}: {error}")]
     Scenario {
@@ -82,6 +100,9 @@ impl CommandError {
             Self::Log(error) => error.hint(),
             Self::Source(error) => error.hint(),
             Self::Resolve(error) => Some(error.hint()),
+            Self::NothingInCommon { .. } => {
+                Some("`--reference-time log` takes the reference's log times instead of its stamps".into())
+            }
             _ => None,
         }
     }
@@ -95,7 +116,10 @@ impl CommandError {
             Self::Source(error) => error.is_usage(),
             Self::Simulate(error) => is_of_scenario(error),
             Self::Scenario { error, .. } => is_of_scenario(error),
-            Self::Estimate(_) | Self::NotFinite { .. } => false,
+            Self::Estimate(_)
+            | Self::NotFinite { .. }
+            | Self::NothingInCommon { .. }
+            | Self::Stdout { .. } => false,
         };
         if usage { 2 } else { 1 }
     }
@@ -152,7 +176,14 @@ fn say(voice: Voice, text: &str, json: &impl serde::Serialize, warnings: &[Strin
         }
         _ => {}
     }
-    if !voice.quiet && (voice.json || !stdout.is_terminal()) {
+    if voice.json || !stdout.is_terminal() {
+        warn(voice, warnings);
+    }
+}
+
+/// Prints warnings on stderr, unless nobody wants them there.
+fn warn(voice: Voice, warnings: &[String]) {
+    if !voice.quiet {
         let mut stderr = io::stderr().lock();
         for warning in warnings {
             let _ = writeln!(stderr, "warning: {}", printable(warning));

@@ -7,7 +7,7 @@ use crate::track::Phase;
 /// A source has stopped seeing when it misses this many of its usual intervals in a row.
 ///
 /// 10: bursts of about five lost samples are usual with acoustics and are no change of phase. A guess.
-const OUTAGE_INTERVALS: f64 = 10.0;
+pub const OUTAGE_INTERVALS: f64 = 10.0;
 
 /// When each source sees the vehicle.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,7 +25,9 @@ pub fn median_interval_s(source: &Source) -> Option<f64> {
     median_step_s(Quantity::ALL.map(|q| source.series(q)).into_iter().max_by_key(|s| s.len())?)
 }
 
-fn median_step_s(series: &[Sample]) -> Option<f64> {
+/// The median interval between successive distinct times of a series, s.
+#[must_use]
+pub fn median_step_s(series: &[Sample]) -> Option<f64> {
     let mut steps: Vec<f64> =
         series.windows(2).map(|w| w[1].time_s - w[0].time_s).filter(|d| *d > 0.0).collect();
     robust::median(&mut steps)

@@ -179,6 +179,17 @@ impl Log {
         self.file.bytes(start, self.index.file_len - start, "the summary")
     }
 
+    /// The entries of the last metadata record of that name, `None` where there is none.
+    ///
+    /// # Errors
+    /// [`LogError::Read`]; [`LogError::Damaged`]; [`LogError::TooLarge`].
+    pub fn metadata(&self, name: &str) -> Result<Option<BTreeMap<String, String>>, LogError> {
+        let Some(entry) = self.index.metadata.iter().rfind(|m| m.name == name) else { return Ok(None) };
+        let head = self.file.head(entry.offset, self.index.data_end)?;
+        let record: mcap::records::Metadata = read_record(&self.file, head, "metadata")?;
+        Ok(Some(record.metadata))
+    }
+
     /// The parts of the log that hold messages, in file order.
     pub(super) fn blocks(&self) -> Vec<chunk::Block<'_>> {
         chunk::blocks(&self.index)

@@ -4,10 +4,8 @@ use serde::Serialize;
 
 use super::fields::{Stamp, Xyz, json, micro, xyz};
 use super::{Context, Published, Topic};
+use crate::quality::BAND_SIGMAS;
 use crate::track::{Track, TrackPoint};
-
-/// 95 % of a normal distribution lie within this many standard deviations.
-pub(super) const BAND_SIGMAS: f64 = 1.959_963_984_540_054;
 
 #[derive(Serialize)]
 struct PointMessage<'a> {

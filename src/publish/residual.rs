@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::fields::{Stamp, Xyz, json, rounded};
 use super::{Context, Published, Topic};
 use crate::estimate::coverage::Coverage;
-use crate::quality::{Deviation, Residual};
+use crate::quality::{Misfit, Residual};
 
 #[derive(Serialize)]
 struct ResidualMessage<'a> {
@@ -33,10 +33,10 @@ pub(super) fn residual_messages<'a>(
     context: Context<'a>,
 ) -> impl Iterator<Item = Published> + 'a {
     residuals.iter().filter_map(move |residual| {
-        let [position, velocity] = residual.deviations;
+        let [position, velocity] = residual.misfits;
         // noise doesn't compress: no more digits than tell one residual from another
-        let vector = |d: Deviation| rounded(d.vector, 1e4);
-        let normalised = |d: Deviation| Some((d.normalised * 1e3).round() / 1e3).filter(|n| n.is_finite());
+        let vector = |m: Misfit| rounded(m.vector, 1e4);
+        let normalised = |m: Misfit| Some((m.normalised * 1e3).round() / 1e3).filter(|n| n.is_finite());
         let data = json(&ResidualMessage {
             timestamp: residual.time.into(),
             frame_id,

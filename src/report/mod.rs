@@ -1,7 +1,14 @@
 //! What is to be said of a result: one value, rendered as text for people or as JSON for programs.
 
+mod comparison;
+mod comparison_text;
+pub mod csv;
 mod text;
 
+pub use comparison::{
+    ComparisonParts, ComparisonReport, Crossing, CrossingReport, PhaseErrors, ReferenceReport, WorstReport,
+};
+pub use comparison_text::render_comparison;
 pub use text::render;
 
 use schemars::JsonSchema;
@@ -353,14 +360,22 @@ mod tests {
     use std::path::Path;
 
     #[test]
-    fn the_schema_in_the_tree_is_the_one_of_this_code() {
-        let schema =
-            serde_json::to_string_pretty(&schemars::schema_for!(super::Report)).expect("a schema is JSON");
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas/fuse.schema.json");
-        if std::env::var_os("TRACKFUSE_UPDATE_SCHEMAS").is_some() {
-            std::fs::write(&path, format!("{schema}\n")).expect("the tree can be written");
+    fn the_schemas_in_the_tree_are_those_of_this_code() {
+        let schemas = [
+            ("fuse", schemars::schema_for!(super::Report)),
+            ("compare", schemars::schema_for!(super::ComparisonReport)),
+        ];
+        for (command, schema) in schemas {
+            let schema = serde_json::to_string_pretty(&schema).expect("a schema is JSON");
+            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("schemas/{command}.schema.json"));
+            if std::env::var_os("TRACKFUSE_UPDATE_SCHEMAS").is_some() {
+                std::fs::write(&path, format!("{schema}\n")).expect("the tree can be written");
+            }
+            let stored = std::fs::read_to_string(&path).expect("a schema");
+            assert!(
+                stored.trim_end() == schema,
+                "{command} differs; TRACKFUSE_UPDATE_SCHEMAS=1 writes it anew"
+            );
         }
-        let stored = std::fs::read_to_string(&path).expect("schemas/fuse.schema.json");
-        assert!(stored.trim_end() == schema, "it differs; TRACKFUSE_UPDATE_SCHEMAS=1 writes it anew");
     }
 }

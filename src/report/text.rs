@@ -69,13 +69,15 @@ fn write_page(out: &mut String, report: &Report) -> fmt::Result {
         writeln!(out)?;
         events(out, report)?;
     }
-    if !report.warnings.is_empty() {
+    warnings(out, &report.warnings)
+}
+
+/// The warnings, a line each, behind an empty one.
+pub(super) fn warnings(out: &mut String, warnings: &[String]) -> fmt::Result {
+    if !warnings.is_empty() {
         writeln!(out)?;
-        for warning in &report.warnings {
-            writeln!(out, "warning: {}", printable(warning))?;
-        }
     }
-    Ok(())
+    warnings.iter().try_for_each(|warning| writeln!(out, "warning: {}", printable(warning)))
 }
 
 fn sources(out: &mut String, report: &Report) -> fmt::Result {
@@ -180,7 +182,7 @@ fn events(out: &mut String, report: &Report) -> fmt::Result {
 }
 
 /// A number without needless digits.
-fn short(v: f64) -> String {
+pub(super) fn short(v: f64) -> String {
     let text = format!("{v:.2}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }

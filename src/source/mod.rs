@@ -7,9 +7,11 @@ mod gathered;
 mod load;
 mod reading;
 mod recognise;
+mod recorded;
 
 pub use load::{Loaded, SigmaOrigin, Timing, datum, load};
 pub use recognise::{Candidate, Choice, Recognised, is_datum_like, recognise};
+pub use recorded::{Recorded, recorded, reference};
 
 use crate::config::TimeChoice;
 use crate::log::LogError;
@@ -134,6 +136,16 @@ pub enum SourceError {
         /// Number of samples.
         count: usize,
     },
+    /// A topic's messages hold no vector where the usual messages keep one.
+    #[error("topic {topic:?}: no {what} where the usual messages keep one, in {}", printable(found))]
+    NoVectors {
+        /// The topic.
+        topic: String,
+        /// What was looked for.
+        what: &'static str,
+        /// What its messages hold.
+        found: String,
+    },
     /// Nothing was measured.
     #[error("source {name:?}: topic {topic:?} has no messages that its path lets through")]
     Empty {
@@ -171,6 +183,9 @@ impl SourceError {
             }
             Self::NoVector { spare: true, .. } => {
                 "leave `velocity` out of this source's table in the config to do without it".into()
+            }
+            Self::NoVectors { topic, what, .. } => {
+                format!("name the {what} by its message path: `{}.field`", printable(topic))
             }
             Self::NoTime { .. } | Self::OneInstant { .. } => {
                 "`time = \"publish\"` or `time = \"log\"` in this source takes another clock".into()

@@ -216,15 +216,7 @@ fn candidates(log: &Log, prefix: &str) -> Result<(Vec<Candidate>, Unusable), Sou
                 continue;
             }
         };
-        let field = |fields: &[&str]| {
-            let named = |f: &str| f != "vector" || vector_is(topic, fields);
-            let fits = |f: &&&str| vector_at(&value, f) && named(f);
-            // a sensor may begin before it has anything to say
-            let may_fit = |f: &&&str| sensor_word(topic).is_some() && absent_at(&value, f) && named(f);
-            let found = fields.iter().find(fits).or_else(|| fields.iter().find(may_fit));
-            found.map(|f| format!("{}.{f}", quoted(topic)))
-        };
-        let (position, velocity) = (field(&POSITION_FIELDS), field(&VELOCITY_FIELDS));
+        let (position, velocity) = paths_in(topic, &value);
         if position.is_some() || velocity.is_some() {
             found.entry(topic).or_insert(Candidate { topic: topic.to_owned(), position, velocity });
         } else {
@@ -241,6 +233,49 @@ fn candidates(log: &Log, prefix: &str) -> Result<(Vec<Candidate>, Unusable), Sou
 fn is_own(index: &Index, topic: &str, prefix: &str) -> bool {
     let below = |prefix: &str| topic.strip_prefix(prefix).is_some_and(|rest| rest.starts_with('/'));
     below(prefix) || index.metadata.iter().filter_map(|m| m.name.strip_prefix("trackfuse:")).any(below)
+}
+
+/// Message paths of the position and the velocity in a topic's message, where the usual messages keep them.
+fn paths_in(topic: &str, value: &Value) -> (Option<String>, Option<String>) {
+    let path = |fields: &[&str]| {
+        let named = |f: &str| f != "vector" || vector_is(topic, fields);
+        let fits = |f: &&&str| vector_at(value, f) && named(f);
+        // a sensor may begin before it has anything to say
+        let may_fit = |f: &&&str| sensor_word(topic).is_some() && absent_at(value, f) && named(f);
+        let found = fields.iter().find(fits).or_else(|| fields.iter().find(may_fit));
+        found.map(|f| format!("{}.{f}", quoted(topic)))
+    };
+    (path(&POSITION_FIELDS), path(&VELOCITY_FIELDS))
+}
+
+/// The same of a topic of the log, by its first message, whatever its name.
+///
+/// # Errors
+/// [`SourceError::NoTopic`]; [`SourceError::Decode`]; [`SourceError::NoVectors`] where it holds neither.
+pub(super) fn paths_of_topic(
+    log: &Log,
+    topic: &str,
+) -> Result<(Option<String>, Option<String>), SourceError> {
+    let (index, name) = (log.index(), topic.to_owned());
+    let topic = name.clone();
+    let Some(channel) = index.channels_of(&topic).next() else {
+        let topics: BTreeSet<String> = index.channels.values().map(|c| c.topic.clone()).collect();
+        return Err(SourceError::NoTopic { name, topic, topics: topics.into_iter().collect() });
+    };
+    let schema = index.schema_of(channel);
+    let (encoding, schema_name, data) =
+        schema.map_or(("", "", &[][..]), |s| (s.encoding.as_str(), s.name.as_str(), s.data.as_slice()));
+    let first = log.first_messages(&[channel.id].into())?;
+    let Some(message) = first.get(&channel.id) else { return Err(SourceError::Empty { name, topic }) };
+    let decoded = Decoder::new(&channel.message_encoding, encoding, schema_name, data)
+        .and_then(|decoder| decoder.decode(&message.data));
+    let value = decoded.map_err(|error| SourceError::Decode { name, topic: topic.clone(), error })?;
+    let paths = paths_in(&topic, &value);
+    if paths == (None, None) {
+        let what = "position or velocity";
+        return Err(SourceError::NoVectors { topic, what, found: fields_of(&value) });
+    }
+    Ok(paths)
 }
 
 fn is_reference(topic: &str) -> bool {

@@ -11,9 +11,9 @@ use lines::{Polyline, polylines};
 use primitives::{Color, Entity, KeyValue, Label, Line, SceneUpdate, Sphere};
 
 use super::fields::{Pose, Stamp, Xyz, drawn_in, json, milli};
-use super::point::BAND_SIGMAS;
 use super::{Context, Published, Topic};
 use crate::fusion::Fusion;
+use crate::quality::BAND_SIGMAS;
 use crate::sample::{Quantity, Source};
 use crate::time::Time;
 use crate::track::{Phase, State};

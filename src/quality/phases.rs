@@ -1,9 +1,9 @@
-//! How good a track is: how far the samples lie from it, phase by phase, and how sure it is of itself.
+//! How far the samples lie from the track, phase by phase, and how sure the track is of itself.
 
+use super::residuals::Residual;
 use crate::estimate::coverage::Coverage;
-use crate::sample::{Sample, Source};
 use crate::time::Time;
-use crate::track::{Curve, Phase, Track, TrackPoint};
+use crate::track::{Phase, Track, TrackPoint};
 
 /// One kind of stretch of the track, summed over the log.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,53 +23,6 @@ pub struct PhaseSummary {
     pub sigma: [f64; 2],
     /// Number of separate stretches.
     pub stretches: usize,
-}
-
-/// How far one sample lies from the track.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Deviation {
-    /// Sample less track, m or m/s.
-    pub vector: [f64; 3],
-    /// The same over the sample's standard deviations, root mean square of the three axes.
-    pub normalised: f64,
-}
-
-/// How far what a source measured at one instant lies from the track.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Residual {
-    /// The instant.
-    pub time: Time,
-    /// Index of the source.
-    pub source: usize,
-    /// Of its position and of its velocity, where it measured one and the track reaches.
-    pub deviations: [Option<Deviation>; 2],
-    /// The sources that see this instant: bit i is the i-th.
-    pub seen_by: u32,
-}
-
-/// The residuals of all samples of the fitted pieces, in order of time and then of sources.
-#[must_use]
-pub fn residuals(pieces: &[(&[Source], &dyn Curve)], origin: Time, coverage: &Coverage) -> Vec<Residual> {
-    let mut residuals = Vec::new();
-    for (sources, curve) in pieces {
-        for (source, samples) in sources.iter().enumerate() {
-            for (position, velocity) in samples.instants() {
-                let Some(time_s) = position.or(velocity).map(|s| s.time_s) else { continue };
-                let Some(state) = curve.at(time_s) else { continue };
-                residuals.push(Residual {
-                    time: origin.plus_seconds(time_s),
-                    source,
-                    deviations: [
-                        position.map(|sample| deviation(sample, state.position)),
-                        velocity.map(|sample| deviation(sample, state.velocity)),
-                    ],
-                    seen_by: coverage.seen_by(time_s),
-                });
-            }
-        }
-    }
-    residuals.sort_by_key(|r| (r.time, r.source));
-    residuals
 }
 
 /// Sums up the track and the residuals, phase by phase, in order of first appearance.
@@ -109,9 +62,9 @@ pub fn phases(track: &Track, origin: Time, residuals: &[Residual]) -> Vec<PhaseS
         let Some(index) = summaries.iter().position(|s| (s.phase, s.seen_by) == (phase, seen_by)) else {
             continue;
         };
-        for (sum, deviation) in sums[index].iter_mut().zip(residual.deviations) {
-            if let Some(deviation) = deviation {
-                sum.0 += norm_squared(deviation.vector); // (12)
+        for (sum, misfit) in sums[index].iter_mut().zip(residual.misfits) {
+            if let Some(misfit) = misfit {
+                sum.0 += norm_squared(misfit.vector); // (12)
                 sum.1 += 1;
             }
         }
@@ -123,12 +76,6 @@ pub fn phases(track: &Track, origin: Time, residuals: &[Residual]) -> Vec<PhaseS
     summaries
 }
 
-fn deviation(sample: &Sample, fitted: [f64; 3]) -> Deviation {
-    let vector: [f64; 3] = std::array::from_fn(|i| sample.value[i] - fitted[i]);
-    let in_sigmas: [f64; 3] = std::array::from_fn(|i| vector[i] / sample.sigma[i]);
-    Deviation { vector, normalised: (norm_squared(in_sigmas) / 3.0).sqrt() }
-}
-
-fn norm_squared(v: [f64; 3]) -> f64 {
+pub(super) fn norm_squared(v: [f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum()
 }

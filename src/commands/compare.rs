@@ -1,0 +1,109 @@
+//! `trackfuse compare`: a track of a log against a reference channel of it.
+
+use super::{CommandError, Outcome, say};
+use crate::cli::Compare;
+use crate::estimate::characteristic_point::Height;
+use crate::log::Log;
+use crate::quality::{self, Comparison};
+use crate::report::{ComparisonParts, ComparisonReport, render_comparison};
+use crate::sample::Quantity;
+use crate::source::{self, Loaded, Recorded};
+use crate::time::Time;
+
+/// Holds a track against a reference, and says how far they are apart.
+///
+/// # Errors
+/// [`CommandError`] for a log that can't be read, a channel that doesn't fit, and two that have no instant in
+/// common.
+pub fn compare(args: &Compare) -> Result<Outcome, CommandError> {
+    let log = Log::open(&args.log)?;
+    let estimate = source::recorded(&log, &args.estimate)?;
+    let (mut reference, reference_origin) = source::reference(&log, &args.reference, args.reference_time)?;
+    let t0 = estimate.origin();
+    let shift_s = reference_origin.seconds_since(t0);
+    for quantity in Quantity::ALL {
+        reference.source.series_mut(quantity).iter_mut().for_each(|s| s.time_s += shift_s);
+    }
+    let mut heights = heights_of_events(&log, &args.estimate)?;
+    heights.extend(args.height.iter().cloned());
+
+    let comparison = quality::compare(&estimate.track, t0, &reference.source, &heights);
+    if comparison.all.position.is_none() && comparison.all.velocity.is_none() {
+        let span = |times: Option<(f64, f64)>| {
+            times.map_or("nothing".into(), |(a, b)| format!("{a:.2} to {b:.2} s"))
+        };
+        let ends = estimate.track.points.first().zip(estimate.track.points.last());
+        return Err(CommandError::NothingInCommon {
+            estimate: span(ends.map(|(a, b)| (a.time.seconds_since(t0), b.time.seconds_since(t0)))),
+            reference: span(reference.source.span_s()),
+        });
+    }
+    let warnings = warnings(&args.estimate, &estimate, &reference, &comparison);
+    let report = ComparisonReport::new(&ComparisonParts {
+        log: &args.log.display().to_string(),
+        topic: &args.estimate,
+        estimate: &estimate,
+        reference: &reference,
+        t0,
+        comparison: &comparison,
+        warnings: &warnings,
+    });
+    say(args.voice, &render_comparison(&report), &report, &warnings);
+    Ok(if warnings.is_empty() { Outcome::Done } else { Outcome::Warned })
+}
+
+/// The heights of the characteristic points that were written beside the track.
+fn heights_of_events(log: &Log, topic: &str) -> Result<Vec<Height>, CommandError> {
+    let prefix = topic.rsplit_once('/').map_or("", |(prefix, _)| prefix);
+    let events = format!("{prefix}/events");
+    let channels = log.index().channels_of(&events).map(|c| c.id).collect();
+    let mut found: Vec<(Time, Height)> = Vec::new();
+    log.for_each_message(&channels, |message| {
+        let value: serde_json::Value = serde_json::from_slice(message.data).unwrap_or_default();
+        if let (Some(name), Some(z_m)) = (value["name"].as_str(), value["position"]["z"].as_f64()) {
+            let time = Time::from_log(message.log_time).unwrap_or(Time::from_ns(0));
+            found.push((time, Height { name: name.to_owned(), z_m }));
+        }
+        Ok::<_, crate::log::LogError>(())
+    })?;
+    found.sort_by_key(|(time, _)| *time);
+    Ok(found.into_iter().map(|(_, height)| height).collect())
+}
+
+/// What would make the numbers mean something else than they seem to.
+fn warnings(topic: &str, estimate: &Recorded, reference: &Loaded, comparison: &Comparison) -> Vec<String> {
+    let mut warnings = estimate.warnings.clone();
+    warnings.extend(reference.warnings.iter().cloned());
+    let (own, its) = (&estimate.track.frame_id, &reference.frame_id);
+    if !own.is_empty() && !its.is_empty() && own != its {
+        warnings.push(format!(
+            "the track is in frame {own:?}, the reference in {its:?}: they are taken as one, and errors mean nothing \
+             if they aren't"
+        ));
+    }
+    let paths = [&reference.config.position, &reference.config.velocity];
+    let of_reference = |made_of: &&String| {
+        paths
+            .into_iter()
+            .flatten()
+            .any(|p| p.strip_prefix(made_of.as_str()).is_some_and(|r| r.starts_with('.')))
+    };
+    if let Some(made_of) = estimate.made_of.iter().find(of_reference) {
+        warnings.push(format!("{topic} was made of {made_of}: that it agrees with it proves nothing"));
+    }
+    for (q, errors) in [&comparison.all.position, &comparison.all.velocity].into_iter().enumerate() {
+        let quantity = Quantity::ALL[q];
+        let Some((errors, by)) = errors.as_ref().zip(comparison.interpolated[q].as_ref()) else { continue };
+        if by.error > 0.2 * errors.rmse {
+            warnings.push(format!(
+                "the {} is too coarse: interpolating its {} is off by {:.3} {unit}, of an error of {:.3} {unit}",
+                by.series,
+                quantity.name(),
+                by.error,
+                errors.rmse,
+                unit = quantity.unit()
+            ));
+        }
+    }
+    warnings
+}

@@ -1,0 +1,264 @@
+//! Tracks and references out of a log: the way back from channels to what estimators make.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+use super::SourceError;
+use super::load::{Loaded, load};
+use super::recognise::paths_of_topic;
+use crate::config::{SourceConfig, TimeChoice};
+use crate::estimate::coverage::{self, OUTAGE_INTERVALS, interpolate};
+use crate::log::decode::{MessagePath, Step};
+use crate::log::{Log, LogError};
+use crate::sample::Sample;
+use crate::time::Time;
+use crate::track::{Method, Phase, State, Track, TrackPoint};
+
+/// Schema of the tracks that this program writes.
+const TRACK_SCHEMA: &str = "trackfuse.TrackPoint";
+
+/// A track as it stands in a log.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recorded {
+    /// Its points in order of time. Where the channel doesn't say, sigmas and velocities are NaN.
+    pub track: Track,
+    /// The sources that its points name, by bit of [`TrackPoint::seen_by`]; the topic where it names none.
+    pub sources: Vec<String>,
+    /// Whether phases and methods are the channel's own; else they mean nothing.
+    pub has_phases: bool,
+    /// T0 as the log's metadata has it for this track.
+    pub t0: Option<Time>,
+    /// Topics that the track was made of, as the metadata has them.
+    pub made_of: Vec<String>,
+    /// What a person must read, a sentence each.
+    pub warnings: Vec<String>,
+}
+
+impl Recorded {
+    /// T0, else the first point.
+    #[must_use]
+    pub fn origin(&self) -> Time {
+        self.t0.or(self.track.points.first().map(|p| p.time)).unwrap_or(Time::from_ns(0))
+    }
+}
+
+/// Reads the track of a topic: one that this program wrote, or any position, with its velocity if there is one.
+///
+/// # Errors
+/// [`SourceError`], as [`load`].
+pub fn recorded(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
+    let index = log.index();
+    let schema = |c| index.schema_of(c).map(|s| s.name.as_str());
+    let own =
+        index.channels_of(topic).find(|c| c.message_encoding == "json" && schema(c) == Some(TRACK_SCHEMA));
+    if own.is_some() { own_track(log, topic) } else { foreign_track(log, topic) }
+}
+
+/// Reads what a track is to be held against: topics, or message paths of a position and of a velocity.
+///
+/// # Errors
+/// [`SourceError`], as [`load`]; [`SourceError::NoVectors`] for a topic that holds neither.
+pub fn reference(
+    log: &Log,
+    given: &[String],
+    time: Option<TimeChoice>,
+) -> Result<(Loaded, Time), SourceError> {
+    let name = given.join(", ");
+    let mut config = SourceConfig { name: name.clone(), time, ..SourceConfig::default() };
+    for text in given {
+        let path = if log.index().channels_of(text).next().is_some() {
+            MessagePath { topic: text.clone(), steps: Vec::new() }
+        } else {
+            MessagePath::parse(text).map_err(|error| SourceError::Path { name: name.clone(), error })?
+        };
+        let (position, velocity) = match path.steps.last() {
+            None => paths_of_topic(log, &path.topic)?,
+            Some(Step::Field(field)) if is_velocity(field) => (None, Some(text.clone())),
+            Some(_) => (Some(text.clone()), None),
+        };
+        config.position = config.position.take().or(position);
+        config.velocity = config.velocity.take().or(velocity);
+    }
+    let (mut loaded, origin, _) = load(log, &[config], true)?;
+    let one = loaded.pop().ok_or(SourceError::Empty { name, topic: given.join(", ") })?;
+    Ok((one, origin))
+}
+
+/// Whether a field's name is one that velocities usually have.
+fn is_velocity(field: &str) -> bool {
+    let field = field.to_ascii_lowercase();
+    ["vel", "linear", "twist", "speed"].iter().any(|word| field.contains(word))
+}
+
+/// A point as this program writes it.
+#[derive(Deserialize)]
+struct PointMessage {
+    timestamp: Stamp,
+    #[serde(default)]
+    frame_id: String,
+    position: Xyz,
+    velocity: Xyz,
+    acceleration: Option<Xyz>,
+    position_sigma: Option<Xyz>,
+    velocity_sigma: Option<Xyz>,
+    phase: Phase,
+    method: Method,
+    #[serde(default)]
+    sources: Vec<String>,
+}
+
+#[derive(Deserialize)]
+struct Stamp {
+    sec: i64,
+    nsec: u32,
+}
+
+#[derive(Deserialize)]
+struct Xyz {
+    x: f64,
+    y: f64,
+    z: f64,
+}
+
+impl From<Xyz> for [f64; 3] {
+    fn from(v: Xyz) -> Self {
+        [v.x, v.y, v.z]
+    }
+}
+
+fn own_track(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
+    let channels = log.index().channels_of(topic).map(|c| c.id).collect();
+    let mut names = Names::default();
+    let mut track = Track { frame_id: String::new(), points: Vec::new() };
+    let (mut unreadable, mut reason) = (0_usize, String::new());
+    log.for_each_message(&channels, |message| {
+        let read = serde_json::from_slice::<PointMessage>(message.data).map_err(|e| e.to_string());
+        match read.and_then(|point| names.point(point, &mut track.frame_id)) {
+            Ok(point) => track.points.push(point),
+            Err(error) => {
+                unreadable += 1;
+                reason = error;
+            }
+        }
+        Ok::<_, LogError>(())
+    })?;
+    track.points.sort_by_key(|p| p.time);
+    if track.points.is_empty() {
+        return Err(SourceError::Empty { name: topic.to_owned(), topic: topic.to_owned() });
+    }
+    let mut warnings = Vec::new();
+    if unreadable > 0 {
+        warnings.push(format!("{unreadable} messages of {topic} are left out: {reason}"));
+    }
+    let prefix = topic.rsplit_once('/').map_or(topic, |(prefix, _)| prefix);
+    let metadata = log.metadata(&format!("trackfuse:{prefix}"))?.unwrap_or_default();
+    Ok(Recorded {
+        track,
+        sources: names.list,
+        has_phases: true,
+        t0: t0_of(&metadata),
+        made_of: topics_of(&metadata),
+        warnings,
+    })
+}
+
+/// The sources' names, by bit.
+#[derive(Default)]
+struct Names {
+    list: Vec<String>,
+}
+
+impl Names {
+    fn point(&mut self, message: PointMessage, frame_id: &mut String) -> Result<TrackPoint, String> {
+        const MOST: usize = 32;
+        let mut seen_by = 0;
+        for name in message.sources {
+            let known = self.list.iter().position(|n| *n == name);
+            let bit = known.unwrap_or_else(|| {
+                self.list.push(name);
+                self.list.len() - 1
+            });
+            if bit >= MOST {
+                return Err(format!("more than {MOST} sources"));
+            }
+            seen_by |= 1 << bit;
+        }
+        if frame_id.is_empty() {
+            *frame_id = message.frame_id;
+        }
+        let known = |v: Option<Xyz>| v.map_or([f64::NAN; 3], <[f64; 3]>::from);
+        let time = Time::from_stamp(message.timestamp.sec, message.timestamp.nsec.into());
+        Ok(TrackPoint {
+            time: time.ok_or("a timestamp past the year 2262")?,
+            state: State {
+                position: message.position.into(),
+                velocity: message.velocity.into(),
+                acceleration: message.acceleration.map(Into::into),
+                position_sigma: known(message.position_sigma),
+                velocity_sigma: known(message.velocity_sigma),
+            },
+            phase: message.phase,
+            method: message.method,
+            seen_by,
+        })
+    }
+}
+
+/// T0 as the report in the metadata has it.
+fn t0_of(metadata: &BTreeMap<String, String>) -> Option<Time> {
+    let report: serde_json::Value = serde_json::from_str(metadata.get("report")?).ok()?;
+    report.get("t0_ns")?.as_str()?.parse().ok().map(Time::from_ns)
+}
+
+/// The topics of the sources in the metadata's config.
+fn topics_of(metadata: &BTreeMap<String, String>) -> Vec<String> {
+    #[derive(Default, Deserialize)]
+    struct Config {
+        #[serde(default)]
+        source: Vec<Paths>,
+    }
+    #[derive(Deserialize)]
+    struct Paths {
+        position: Option<String>,
+        velocity: Option<String>,
+    }
+    let text = metadata.get("config").map_or("", String::as_str);
+    let config: Config = toml::from_str(text).unwrap_or_default();
+    let paths = config.source.into_iter().flat_map(|s| [s.position, s.velocity]).flatten();
+    paths.filter_map(|path| Some(MessagePath::parse(&path).ok()?.topic)).collect()
+}
+
+/// A channel of another's making as a track: its positions, with the velocities at their instants.
+fn foreign_track(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
+    let (loaded, origin) = reference(log, &[topic.to_owned()], None)?;
+    let velocities = &loaded.source.velocities;
+    let gap_s = coverage::median_step_s(velocities).map_or(0.0, |step| OUTAGE_INTERVALS * step);
+    let unknown = [f64::NAN; 3];
+    let point = |p: &Sample| TrackPoint {
+        time: origin.plus_seconds(p.time_s),
+        state: State {
+            position: p.value,
+            velocity: interpolate(velocities, p.time_s, gap_s).map_or(unknown, |v| v.value),
+            acceleration: None,
+            position_sigma: unknown,
+            velocity_sigma: unknown,
+        },
+        phase: Phase::Single,
+        method: Method::default(),
+        seen_by: 1,
+    };
+    let points: Vec<TrackPoint> = loaded.source.positions.iter().map(point).collect();
+    if points.is_empty() {
+        let found = "velocities only".to_owned();
+        return Err(SourceError::NoVectors { topic: topic.to_owned(), what: "position", found });
+    }
+    Ok(Recorded {
+        track: Track { frame_id: loaded.frame_id, points },
+        sources: vec![topic.to_owned()],
+        has_phases: false,
+        t0: None,
+        made_of: vec![topic.to_owned()],
+        warnings: loaded.warnings,
+    })
+}
