@@ -7,6 +7,7 @@ use crate::estimate::characteristic_point::Height;
 use crate::estimate::polynomial::Prior;
 use crate::estimate::{coverage, extrapolation};
 use crate::fusion::{self, Fusion, Plan};
+use crate::log::Log;
 use crate::sample::Source;
 use crate::source::Loaded;
 use crate::time::Time;
@@ -163,6 +164,15 @@ const DIFFERENT_EPOCHS_S: f64 = 3600.0;
 #[must_use]
 pub fn log_time_shift_s(datum: &Loaded) -> Option<f64> {
     Some(datum.timing.delay_s).filter(|d| d.abs() > DIFFERENT_EPOCHS_S)
+}
+
+/// The instant of the log's first message on the datum's clock, at the earliest that clock's 0: a stamp has no
+/// sign. `None` where the message's log time is 0, which is no time.
+#[must_use]
+pub fn log_start(log: &Log, shift_s: Option<f64>) -> Option<Time> {
+    let start_ns = log.index().statistics.as_ref()?.message_start_time;
+    let start = Time::from_log(start_ns).filter(|_| start_ns != 0)?;
+    Some(start.plus_seconds(-shift_s.unwrap_or(0.0)).max(Time::from_ns(0)))
 }
 
 /// Whether the data look as if z = 0 were the surface.
