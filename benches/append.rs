@@ -10,7 +10,8 @@ use mcap::records::MessageHeader;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use trackfuse::log::{Appender, Compression, Log, NewMessage};
-use trackfuse::publish::{Labels, Topic, track_messages};
+use trackfuse::publish::{Context, Topic, track_messages};
+use trackfuse::sample::Source;
 use trackfuse::time::Time;
 use trackfuse::track::{Method, Phase, State, Track, TrackPoint};
 
@@ -53,7 +54,16 @@ fn append(c: &mut Criterion) {
     let (input, output) = (folder.path().join("in.mcap"), folder.path().join("out.mcap"));
     make_log(&input, megabytes);
     let track = track();
-    let sources = ["tether".to_owned()];
+    let sources = [Source { name: "tether".into(), ..Source::default() }];
+    let zero = Time::from_ns(0);
+    let context = Context {
+        sources: &sources,
+        origin: zero,
+        rate_hz: 100.0,
+        t0: zero,
+        surface_at_zero: true,
+        log_start: None,
+    };
     let channels = Topic::ALL.map(|t| t.channel("/fused"));
 
     let mut group = c.benchmark_group("append");
@@ -72,8 +82,7 @@ fn append(c: &mut Criterion) {
             let log = Log::open(&input).expect("a log");
             let mut appender =
                 Appender::begin(&log, &output, true, &channels, Compression::Zstd).expect("an appender");
-            let labels = Labels { sources: &sources, surface_at_zero: true, t0: Time::from_ns(0) };
-            for message in track_messages(Topic::Track, &track, labels) {
+            for message in track_messages(Topic::Track, &track, context) {
                 let (time_ns, data) = (message.time.to_log(), &message.data[..]);
                 appender.write(NewMessage { channel: message.topic as usize, time_ns, data }).expect("room");
             }

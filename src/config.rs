@@ -192,7 +192,7 @@ pub struct Fusion {
     pub knot_spacing_s: Option<f64>,
     /// PCF: order of the polynomial; 12 is the paper's best.
     pub order: usize,
-    /// Moving average: points.
+    /// Moving average: points; an even number counts as one less.
     pub window_points: usize,
     /// The longest silence of all sources that the track bridges, s. A guess.
     pub bridge_max_s: f64,

@@ -15,6 +15,7 @@
 //! | moving average over GDF | [`estimate::moving_average`] | Zhang 2025, Table 1 |
 //! | extrapolation, its band from rolling origins | [`estimate::extrapolation`] | Zhang 2025, sea trial; the band is ours |
 //! | characteristic points | [`estimate::characteristic_point`] | Zhang 2025, eq. 13 |
+//! | lines of a picture, thinned | [`math::polyline`] | Visvalingam & Whyatt 1993 |
 //!
 //! Zhang 2025 is Zhang Xu, sectional track fusion by functional reconstruction, doi 10.19693/j.issn.1673-3185.04263.
 //!

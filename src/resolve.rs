@@ -6,8 +6,8 @@ use crate::config::{self, Config, ExtrapolationMethod, Registration};
 use crate::estimate::characteristic_point::Height;
 use crate::estimate::coverage;
 use crate::estimate::extrapolation::{self, Law, LawKind};
-use crate::estimate::polynomial::Prior;
 use crate::fusion::{self, Fusion, Plan};
+use crate::log::Log;
 use crate::sample::Source;
 use crate::source::Loaded;
 use crate::time::Time;
@@ -132,20 +132,17 @@ fn rate_hz(config: &Config, sources: &[Source], warnings: &mut Vec<String>) -> R
     Ok(lowered)
 }
 
-/// The extrapolation's prior: the acceleration dies away in 2 s, its derivatives within 0.25 m/s^3, m/s^4. The best of
-/// several on simulated climbs; a body slowed by the drag k v^2 has tau = 1 / 2 k v, 2 s at 12 m/s and 0.02 /m.
-const PRIOR: Prior = Prior { sigma: 0.25, decay_s: Some(2.0) };
-
-/// What the track may be carried on by. Each law is fitted to the last stretch, by default of the length that was the
-/// best of several on simulated climbs, but of at least 12 median intervals of the slowest source.
+/// What the track may be carried on by. Each law is fitted to the last stretch, by default of its own length, but of
+/// at least 12 median intervals of the slowest source.
 fn laws(beyond: &config::Extrapolation, sources: &[Source]) -> Vec<Law> {
     let slowest = sources.iter().filter_map(coverage::median_interval_s).fold(0.0, f64::max);
-    let window_s = |default_s: f64| beyond.window_s.unwrap_or(f64::max(default_s, 12.0 * slowest));
-    let polynomial = Law {
-        kind: LawKind::Polynomial { order: beyond.order, prior: beyond.prior.then_some(PRIOR) },
-        window_s: window_s(1.4),
+    let windowed = |law: Law| {
+        let window_s = beyond.window_s.unwrap_or(law.window_s.max(12.0 * slowest));
+        Law { window_s, ..law }
     };
-    let drag = Law { kind: LawKind::Drag, window_s: window_s(0.9) };
+    let prior = beyond.prior.then_some(extrapolation::PRIOR);
+    let kind = LawKind::Polynomial { order: beyond.order, prior };
+    let (polynomial, drag) = (windowed(Law { kind, ..Law::POLYNOMIAL }), windowed(Law::DRAG));
     match beyond.method {
         ExtrapolationMethod::Pcf => vec![polynomial],
         ExtrapolationMethod::Drag => vec![drag],
@@ -170,6 +167,15 @@ const DIFFERENT_EPOCHS_S: f64 = 3600.0;
 #[must_use]
 pub fn log_time_shift_s(datum: &Loaded) -> Option<f64> {
     Some(datum.timing.delay_s).filter(|d| d.abs() > DIFFERENT_EPOCHS_S)
+}
+
+/// The instant of the log's first message on the datum's clock, at the earliest that clock's 0: a stamp has no
+/// sign. `None` where the message's log time is 0, which is no time.
+#[must_use]
+pub fn log_start(log: &Log, shift_s: Option<f64>) -> Option<Time> {
+    let start_ns = log.index().statistics.as_ref()?.message_start_time;
+    let start = Time::from_log(start_ns).filter(|_| start_ns != 0)?;
+    Some(start.plus_seconds(-shift_s.unwrap_or(0.0)).max(Time::from_ns(0)))
 }
 
 /// Whether the data look as if z = 0 were the surface.

@@ -1,10 +1,12 @@
 //! The process's edge: exit codes, what is printed, what is left on the disk.
 //!
 //! Every run of `fuse` here is also held to what holds for all: the input stays as it was, no temporary file
-//! remains, and a failure leaves nothing behind (see `Trial::fuse`).
+//! remains, a failure leaves nothing behind, and viewers show what was added (see `Trial::fuse_with`).
 
 // Helpers of tests, which the exception in clippy.toml doesn't reach.
 #![allow(clippy::unwrap_used)]
+
+mod viewer_rules;
 
 mod cli {
     mod bad_input;
@@ -17,4 +19,5 @@ mod cli {
     mod sources;
     mod trial;
     mod trial_log;
+    mod viewer_topics;
 }

@@ -6,7 +6,9 @@ use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use trackfuse::simulate::{Scenario, write_log};
+use trackfuse::simulate::{FAMILIES, Scenario, write_log};
+
+mod viewer_rules;
 
 fn scenarios() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_logs");
@@ -24,10 +26,9 @@ fn stored(scenario: &Path) -> PathBuf {
     scenario.with_extension("").with_extension("mcap")
 }
 
-fn log_of(scenario: &Path) -> Vec<u8> {
-    let scenario = Scenario::from_toml(&fs::read_to_string(scenario).unwrap()).unwrap();
+fn log_of(scenario: &Scenario) -> Vec<u8> {
     let mut log = Cursor::new(Vec::new());
-    write_log(&scenario, &mut log).unwrap();
+    write_log(scenario, &mut log).unwrap();
     log.into_inner()
 }
 
@@ -38,7 +39,7 @@ fn every_sample_log_is_what_its_scenario_makes() {
     assert_eq!(scenarios.len(), 3, "{scenarios:?}");
     for scenario in scenarios {
         let stored = stored(&scenario);
-        let log = log_of(&scenario);
+        let log = log_of(&Scenario::from_toml(&fs::read_to_string(&scenario).unwrap()).unwrap());
         if update {
             fs::write(&stored, log).unwrap();
             continue;
@@ -66,5 +67,17 @@ fn sample_logs_are_small_indexed_and_have_the_channels_they_promise() {
         let times: Vec<u64> =
             mcap::MessageStream::new(&bytes).unwrap().map(|message| message.unwrap().log_time).collect();
         assert!(times.is_sorted(), "{}", path.display());
+    }
+}
+
+#[test]
+fn viewers_show_every_channel_of_simulated_logs() {
+    for family in FAMILIES {
+        let log = log_of(&Scenario::family(family).unwrap());
+        assert_eq!(viewer_rules::violations(&log, |_| true), [""; 0], "{family}");
+    }
+    for path in scenarios() {
+        let log = fs::read(stored(&path)).unwrap();
+        assert_eq!(viewer_rules::violations(&log, |_| true), [""; 0], "{}", path.display());
     }
 }

@@ -9,7 +9,7 @@ use crate::cli::Fuse;
 use crate::config::Config;
 use crate::fusion::{self, Fusion};
 use crate::log::{Appender, Log, NewMetadata};
-use crate::publish::{Labels, Topic, messages};
+use crate::publish::{Context, Topic, messages};
 use crate::report::{self, Report};
 use crate::resolve;
 use crate::sample::Source;
@@ -66,10 +66,16 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     });
     let text = report::render(&report);
 
-    let names: Vec<String> = sources.iter().map(|s| s.name.clone()).collect();
-    let labels = Labels { sources: &names, surface_at_zero: config.output.surface_at_zero == Some(true), t0 };
+    let context = Context {
+        sources: &sources,
+        origin,
+        rate_hz: plan.rate_hz,
+        t0,
+        surface_at_zero: config.output.surface_at_zero == Some(true),
+        log_start: resolve::log_start(&log, shift_s),
+    };
     let mut appender = Appender::begin(&log, &output, args.force, &channels, config.output.compression)?;
-    for message in messages(&fusion, labels, &text, &warnings) {
+    for message in messages(&fusion, context, &text, &warnings) {
         appender.write(crate::log::NewMessage {
             channel: message.topic as usize,
             time_ns: message.time.plus_seconds(shift_s.unwrap_or(0.0)).to_log(),

@@ -1,8 +1,11 @@
 //! The moving average over the weighted mean: the paper's third rival (Zhang 2025, Table 1).
 //!
-//! The mean of the `window` points around each point, the window cut off at the ends; of an even window
-//! the extra point lies before. Its band is the weighted mean's own: averaging lowers the noise, but adds
-//! a lag that it knows nothing of.
+//! The mean of the points around each point, as many before as after it: a straight line stays what it is, at
+//! the ends too. An even window therefore has one point less, and towards the ends of a stretch the window
+//! shrinks to what fits on both sides. The paper doesn't say how it treats either; with windows that are cut off
+//! on one side its Table 1 can't be remade, with these (those of MATLAB's `smooth`, whose default is the paper's
+//! 5) it can. The band is the weighted mean's own: averaging lowers the noise, but flattens bends, which the
+//! band knows nothing of.
 
 use super::EstimateError;
 use crate::track::{Curve, State};
@@ -38,8 +41,8 @@ impl MovingAverage {
         for stretch in raw.chunk_by(|a, b| b.0 - a.0 <= max_gap_s) {
             let sums = running_sums(stretch);
             for (i, &(time, mut state)) in stretch.iter().enumerate() {
-                let from = i.saturating_sub(window / 2);
-                let to = (i + window - window / 2).min(stretch.len());
+                let each_side = ((window - 1) / 2).min(i).min(stretch.len() - 1 - i);
+                let (from, to) = (i - each_side, i + each_side + 1);
                 let count = (to - from) as f64;
                 for axis in 0..3 {
                     state.position[axis] = (sums[to].0[axis] - sums[from].0[axis]) / count;
@@ -101,7 +104,22 @@ mod tests {
         let state = average.at(4.0).expect("inside");
         assert!((state.position[2] - 16.5).abs() < 1e-12); // 16 + 2 * 0.25
         assert!((state.velocity[2] - 8.0).abs() < 1e-12);
-        assert!((average.at(0.0).expect("inside").position[2] - (0.0 + 0.25 + 1.0) / 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn windows_shrink_towards_the_ends_and_an_even_one_has_a_point_less() {
+        let average = |window| {
+            let times = (0..=20).map(|i| 0.5 * f64::from(i));
+            MovingAverage::of(&Parabola, times, window, 1.0).expect("points")
+        };
+        let z = |window, t| average(window).at(t).expect("inside").position[2];
+        assert_eq!(z(5, 0.0), 0.0);
+        assert!((z(5, 0.5) - (0.0 + 0.25 + 1.0) / 3.0).abs() < 1e-12);
+        assert_eq!(z(5, 10.0), 100.0);
+        for t in [0.0, 0.5, 4.0, 9.5, 10.0] {
+            assert_eq!(z(6, t), z(5, t));
+            assert!((average(16).at(t).expect("inside").velocity[2] - 2.0 * t).abs() < 1e-12); // a straight line
+        }
     }
 
     #[test]

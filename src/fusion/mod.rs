@@ -19,7 +19,7 @@ use crate::estimate::coverage::{self, Coverage};
 use crate::estimate::extrapolation::{self, Extrapolation, Holdout, Law, LawKind};
 use crate::estimate::{self, EstimateError};
 use crate::estimate::{Coefficients, Estimator};
-use crate::quality::{self, PhaseSummary};
+use crate::quality::{self, PhaseSummary, Residual};
 use crate::sample::Source;
 use crate::time::Time;
 use crate::track::{Curve, Phase, Track, TrackPoint};
@@ -77,6 +77,10 @@ pub struct Fusion {
     pub events: Vec<CharacteristicPoint>,
     /// Pieces that were fitted, s since the origin.
     pub pieces: Vec<(f64, f64)>,
+    /// Who saw what when.
+    pub coverage: Coverage,
+    /// How far the samples lie from the track.
+    pub residuals: Vec<Residual>,
     /// The track phase by phase.
     pub phases: Vec<PhaseSummary>,
     /// How the sources differ where they overlap.
@@ -173,13 +177,16 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
     let track = Track { frame_id: plan.frame_id.clone(), points };
     let fitted: Vec<(&[Source], &dyn Curve)> =
         pieces.iter().map(|p| (p.sources.as_slice(), &*p.curve)).collect();
+    let residuals = quality::residuals(&fitted, plan.origin, &coverage);
     Ok(Fusion {
         events: events(&track, plan, &mut warnings),
-        phases: quality::phases(&track, plan.origin, &fitted, &coverage),
+        phases: quality::phases(&track, plan.origin, &residuals),
+        residuals,
         plain_pcf: Track { frame_id: plan.frame_id.clone(), points: plain },
         track,
         spline: pieces.last().and_then(|p| p.spline),
         pieces: pieces.iter().map(|p| (p.from_s, p.to_s)).collect(),
+        coverage,
         disagreements,
         laws,
         warnings,

@@ -1,9 +1,9 @@
 //! How far the samples lie from the track, phase by phase, and how sure the track is of itself.
 
+use super::residuals::Residual;
 use crate::estimate::coverage::Coverage;
-use crate::sample::{Quantity, Source};
 use crate::time::Time;
-use crate::track::{Curve, Phase, State, Track, TrackPoint};
+use crate::track::{Phase, Track, TrackPoint};
 
 /// One kind of stretch of the track, summed over the log.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,14 +25,9 @@ pub struct PhaseSummary {
     pub stretches: usize,
 }
 
-/// Sums up the track and the samples' distances from it, phase by phase, in order of first appearance.
+/// Sums up the track and the residuals, phase by phase, in order of first appearance.
 #[must_use]
-pub fn phases(
-    track: &Track,
-    origin: Time,
-    pieces: &[(&[Source], &dyn Curve)],
-    coverage: &Coverage,
-) -> Vec<PhaseSummary> {
+pub fn phases(track: &Track, origin: Time, residuals: &[Residual]) -> Vec<PhaseSummary> {
     let mut summaries: Vec<PhaseSummary> = Vec::new();
     for stretch in track.points.chunk_by(|a, b| (a.phase, a.seen_by) == (b.phase, b.seen_by)) {
         let TrackPoint { phase, seen_by, time: from, .. } = stretch[0];
@@ -62,21 +57,15 @@ pub fn phases(
         }
     }
     let mut sums = vec![[(0.0, 0_usize); 2]; summaries.len()];
-    for (sources, curve) in pieces {
-        for sample in sources.iter().flat_map(|s| Quantity::ALL.map(|q| (q, s.series(q)))) {
-            let (quantity, series) = sample;
-            for sample in series {
-                let seen_by = coverage.seen_by(sample.time_s);
-                let phase = Coverage::phase(seen_by);
-                let Some(index) = summaries.iter().position(|s| s.phase == phase && s.seen_by == seen_by)
-                else {
-                    continue;
-                };
-                if let Some(state) = curve.at(sample.time_s) {
-                    let sum = &mut sums[index][quantity as usize];
-                    sum.0 += norm_squared(residual(sample.value, &state, quantity)); // (12)
-                    sum.1 += 1;
-                }
+    for residual in residuals {
+        let (phase, seen_by) = (Coverage::phase(residual.seen_by), residual.seen_by);
+        let Some(index) = summaries.iter().position(|s| (s.phase, s.seen_by) == (phase, seen_by)) else {
+            continue;
+        };
+        for (sum, misfit) in sums[index].iter_mut().zip(residual.misfits) {
+            if let Some(misfit) = misfit {
+                sum.0 += norm_squared(misfit.vector); // (12)
+                sum.1 += 1;
             }
         }
     }
@@ -87,14 +76,6 @@ pub fn phases(
     summaries
 }
 
-fn residual(value: [f64; 3], state: &State, quantity: Quantity) -> [f64; 3] {
-    let fitted = match quantity {
-        Quantity::Position => state.position,
-        Quantity::Velocity => state.velocity,
-    };
-    std::array::from_fn(|i| value[i] - fitted[i])
-}
-
-fn norm_squared(v: [f64; 3]) -> f64 {
+pub(super) fn norm_squared(v: [f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum()
 }

@@ -6,8 +6,8 @@ use std::fmt;
 
 use super::SourceError;
 use crate::config::SourceConfig;
-use crate::log::Log;
 use crate::log::decode::{Decoder, Value};
+use crate::log::{Index, Log};
 use crate::printable::{printable, toml_string};
 
 /// Words of class I sensors, the default datum, then those of class II. The second number of each is
@@ -19,8 +19,9 @@ const OTHER_WORDS: [(&str, bool); 4] =
 /// Topics with one of these words hold what a track is judged by, never what it is made of.
 const REFERENCE_WORDS: [&str; 4] = ["truth", "reference", "ins", "gt"];
 
-/// Schemas of an earlier run's results.
-const OWN_SCHEMAS: [&str; 2] = ["trackfuse.TrackPoint", "trackfuse.CharacteristicPoint"];
+/// Schemas of an earlier run's results, known even where its metadata record is lost.
+const OWN_SCHEMAS: [&str; 3] =
+    ["trackfuse.TrackPoint", "trackfuse.CharacteristicPoint", "trackfuse.Residual"];
 
 /// Where the usual messages keep a position, the most specific first.
 const POSITION_FIELDS: [&str; 5] = ["pose.pose.position", "pose.position", "position", "point", "vector"];
@@ -189,7 +190,7 @@ fn candidates(log: &Log, prefix: &str) -> Result<(Vec<Candidate>, Unusable), Sou
         let (encoding, name, data) =
             schema.map_or(("", "", &[][..]), |s| (s.encoding.as_str(), s.name.as_str(), s.data.as_slice()));
         let topic = channel.topic.as_str();
-        if topic.starts_with(&format!("{prefix}/")) || OWN_SCHEMAS.contains(&name) {
+        if is_own(index, topic, prefix) || OWN_SCHEMAS.contains(&name) {
             unusable.insert(topic, "written by trackfuse".to_owned());
         } else if is_reference(topic) {
             unusable.insert(topic, "by its name a reference, which a track is judged by".to_owned());
@@ -226,6 +227,12 @@ fn candidates(log: &Log, prefix: &str) -> Result<(Vec<Candidate>, Unusable), Sou
     unusable.retain(|topic, _| !found.contains_key(topic));
     let unusable = unusable.into_iter().map(|(topic, why)| (topic.to_owned(), why)).collect();
     Ok((found.into_values().collect(), unusable))
+}
+
+/// Whether a topic is below `prefix`, or below that of an earlier run, which its metadata record names.
+fn is_own(index: &Index, topic: &str, prefix: &str) -> bool {
+    let below = |prefix: &str| topic.strip_prefix(prefix).is_some_and(|rest| rest.starts_with('/'));
+    below(prefix) || index.metadata.iter().filter_map(|m| m.name.strip_prefix("trackfuse:")).any(below)
 }
 
 /// Message paths of the position and the velocity in a topic's message, where the usual messages keep them.

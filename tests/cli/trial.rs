@@ -8,6 +8,8 @@ use std::process::Command;
 use serde_json::Value;
 use tempfile::TempDir;
 
+use crate::viewer_rules;
+
 /// What a run gave.
 #[derive(Debug)]
 pub(crate) struct Ran {
@@ -66,7 +68,7 @@ impl Trial {
     }
 
     /// Runs `trackfuse fuse` with `args`. Whatever they are: what was there stays as it was, but for a
-    /// replaced output; a failure adds nothing; and no temporary file remains.
+    /// replaced output; a failure adds nothing; no temporary file remains; and viewers show what was added.
     pub(crate) fn fuse_with(&self, args: &[&str]) -> Ran {
         let before = self.files();
         let ran = trackfuse(self.folder.path(), &[&["fuse"], args].concat());
@@ -79,6 +81,11 @@ impl Trial {
             assert!(ran.stderr.lines().next().unwrap().len() > 20, "an error says what and where: {ran:#?}");
         }
         assert!(after.keys().all(|name| !name.starts_with(".trackfuse-")), "{:?}", after.keys());
+        for name in
+            after.keys().filter(|&name| matches!(ran.code, 0 | 3) && before.get(name) != after.get(name))
+        {
+            viewer_rules::assert_shown(&self.path(name));
+        }
         ran
     }
 

@@ -85,14 +85,13 @@ pub(super) fn fit(sources: &[Source], from_s: f64, end_s: f64, reach_s: f64) -> 
         let cost = |misfit: &[f64]| misfit.iter().map(|m| m * m).sum::<f64>();
         let shorter = (0..HALVINGS).map(|i| unknowns + step * 0.5_f64.powi(i));
         let mut tried = shorter.map(|u| (u, misfits(&sources, end_s, &u)));
-        match tried.find(|(_, m)| cost(m) < cost(&misfit)).filter(|_| !small) {
-            Some(lower) => (unknowns, misfit) = lower,
-            None => {
-                let noise = solution.residual_sum / (solution.rows - UNKNOWNS) as f64;
-                let states = carried(&unknowns, &solution, noise.max(1.0), reach_s);
-                return Ok(Drag { end_s, states });
-            }
-        }
+        let lower = tried.find(|(_, m)| cost(m) < cost(&misfit)).filter(|_| !small);
+        let Some(lower) = lower else {
+            let noise = solution.residual_sum / (solution.rows - UNKNOWNS) as f64;
+            let states = carried(&unknowns, &solution, noise.max(1.0), reach_s);
+            return Ok(Drag { end_s, states });
+        };
+        (unknowns, misfit) = lower;
     }
     Err(undetermined("its fit doesn't converge"))
 }
@@ -100,7 +99,7 @@ pub(super) fn fit(sources: &[Source], from_s: f64, end_s: f64, reach_s: f64) -> 
 /// The last position and velocity, no force, the drag of the prior.
 fn start(sources: &[Source]) -> Option<Unknowns> {
     let last = |q: Quantity| {
-        let all = sources.iter().flat_map(|s| s.series(q).last());
+        let all = sources.iter().filter_map(|s| s.series(q).last());
         all.max_by(|a, b| a.time_s.total_cmp(&b.time_s))
     };
     let p = last(Quantity::Position)?.value;
