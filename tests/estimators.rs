@@ -4,17 +4,17 @@ use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use trackfuse::estimate::Coefficients;
 use trackfuse::estimate::EstimateError;
 use trackfuse::estimate::coverage::Coverage;
-use trackfuse::estimate::extrapolation;
+use trackfuse::estimate::extrapolation::{self, Law, LawKind};
 use trackfuse::estimate::polynomial::Prior;
+use trackfuse::estimate::{Coefficients, Estimator};
 use trackfuse::fusion::{Fusion, Plan, fuse};
 use trackfuse::sample::{Quantity, Sample, Source};
 use trackfuse::time::Time;
-use trackfuse::track::{Method, TrackPoint};
+use trackfuse::track::TrackPoint;
 
-const METHODS: [Method; 4] = [Estimator::Gdf, Estimator::Pcf, Estimator::Sff, Estimator::MovingAverage];
+const METHODS: [Estimator; 4] = [Estimator::Gdf, Estimator::Pcf, Estimator::Sff, Estimator::MovingAverage];
 
 fn plan(method: Estimator, coefficients: Coefficients) -> Plan {
     Plan {
@@ -28,13 +28,7 @@ fn plan(method: Estimator, coefficients: Coefficients) -> Plan {
         order: 8,
         window_points: 5,
         bridge_max_s: 5.0,
-        extrapolation: Some(extrapolation::Settings {
-            laws: vec![Law {
-                kind: LawKind::Polynomial { order: 4, prior: Some(Prior { sigma: 0.5, decay_s: None }) },
-                window_s: 1.4,
-            }],
-            horizon_s: 0.5,
-        }),
+        extrapolation: Some(extrapolation::Settings { laws: vec![Law::POLYNOMIAL], horizon_s: 0.5 }),
         stop_z_m: None,
         heights: Vec::new(),
     }
@@ -67,7 +61,7 @@ fn run(sources: &[Source], method: Estimator, coefficients: Coefficients) -> Fus
     fuse(sources, &plan(method, coefficients)).expect("a good problem")
 }
 
-fn each(mut check: impl FnMut(Method, Coefficients)) {
+fn each(mut check: impl FnMut(Estimator, Coefficients)) {
     for method in METHODS {
         for coefficients in [Coefficients::Shared, Coefficients::Independent] {
             check(method, coefficients);
