@@ -28,7 +28,13 @@ fn plan(method: Estimator, coefficients: Coefficients) -> Plan {
         order: 8,
         window_points: 5,
         bridge_max_s: 5.0,
-        extrapolation: Some(extrapolation::Settings { laws: vec![Law::POLYNOMIAL], horizon_s: 0.5 }),
+        extrapolation: Some(
+            extrapolation::Settings { laws: // of an acceleration that stays, as that of the parabola below
+            vec![Law {
+                kind: LawKind::Polynomial { order: 4, prior: Some(Prior { sigma: 0.5, decay_s: None }) },
+                window_s: 1.4,
+            }], horizon_s: 0.5 },
+        ),
         stop_z_m: None,
         heights: Vec::new(),
     }
