@@ -28,6 +28,7 @@ pub mod commands;
 pub mod config;
 pub mod estimate;
 pub mod fusion;
+pub mod inspect;
 pub mod log;
 pub mod math;
 mod printable;

@@ -10,6 +10,8 @@ fn main() -> ExitCode {
     let done = match &Cli::parse().command {
         Command::Fuse(args) => commands::fuse(args),
         Command::Simulate(args) => commands::simulate(args),
+        Command::Inspect(args) => commands::inspect(args),
+        Command::Init(args) => commands::init(args),
     };
     match done {
         Ok(outcome) => outcome.into(),

@@ -9,6 +9,8 @@
 mod cli {
     mod bad_input;
     mod exit_code;
+    mod init;
+    mod inspect;
     mod output;
     mod readme;
     mod real_logs;

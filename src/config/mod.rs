@@ -4,6 +4,9 @@
 //! metadata, so that a track can be made again.
 
 mod check;
+mod template;
+
+pub use template::{SourceTable, template};
 
 use std::path::{Path, PathBuf};
 
@@ -65,13 +68,13 @@ impl ConfigError {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
-    /// The output.
+    /// The new topics and their chunks.
     pub output: Output,
     /// The sources; without any, they are recognised by their topics' names.
     pub source: Vec<SourceConfig>,
     /// How they are fused.
     pub fusion: Fusion,
-    /// How the track is carried on.
+    /// How the track is carried on behind the last sample.
     pub extrapolation: Extrapolation,
     /// Heights whose first upward crossing is reported.
     pub characteristic_point: Vec<CharacteristicPoint>,
@@ -85,18 +88,22 @@ pub struct Output {
     pub prefix: String,
     /// Points of the track a second; default: the fastest source's rate.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = 50.0)]
     pub rate_hz: Option<f64>,
     /// Frame of the track; default: the datum's.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = &"enu")]
     pub frame_id: Option<String>,
     /// Compression of the new chunks.
     pub compression: Compression,
     /// T0, from which times count, ns; default: the datum's first sample.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = 1_731_000_000_000_000_000_i64)]
     pub t0_ns: Option<i64>,
     /// Whether z = 0 is the sea surface, so that points carry a depth; default: when every observed position
     /// lies below z = 2 m and some below -2 m.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = true)]
     pub surface_at_zero: Option<bool>,
 }
 
@@ -118,25 +125,31 @@ impl Default for Output {
 #[serde(deny_unknown_fields, default)]
 pub struct SourceConfig {
     /// What to call it.
+    #[schemars(example = &"tether")]
     pub name: String,
     /// Message path of its position, m: an object with x, y, z or an array of three.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = &"/tether/track.position")]
     pub position: Option<String>,
     /// Message path of its velocity, m/s.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = &"/tether/track.velocity")]
     pub velocity: Option<String>,
     /// Whether its bias and clock are zero by definition; default: the tether's are, else the first source's.
     pub datum: bool,
-    /// Its axes.
+    /// Directions of its x, y and z.
     pub axes: Axes,
     /// Standard deviation of its position, m; default: from the messages, else estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = 0.2)]
     pub position_sigma_m: Option<f64>,
     /// Standard deviation of its velocity, m/s; default: from the messages, else estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = 0.2)]
     pub velocity_sigma_m_s: Option<f64>,
     /// What counts as a sample's time; default: its stamp, else the publish time, else the log time.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = &"log")]
     pub time: Option<TimeChoice>,
     /// How long before its time a sample was taken, s.
     pub latency_s: f64,
@@ -144,6 +157,7 @@ pub struct SourceConfig {
     pub offset_m: [f64; 3],
     /// Frame of its velocities; default: `body` for `nav_msgs/Odometry`, else `world`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = &"world")]
     pub velocity_frame: Option<VelocityFrame>,
 }
 
@@ -184,7 +198,7 @@ pub enum VelocityFrame {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Fusion {
-    /// The estimator.
+    /// How the sources become one track.
     pub method: Method,
     /// Whether the velocity is the derivative of the position (`shared`), or both are fitted apart.
     pub coefficients: Coefficients,
@@ -192,6 +206,7 @@ pub struct Fusion {
     pub estimate: Registration,
     /// SFF: knot spacing, s; default: the fastest source's median interval, but at least 0.08 s.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = 0.1)]
     pub knot_spacing_s: Option<f64>,
     /// PCF: order of the polynomial; 12 is the paper's best.
     pub order: usize,
@@ -237,7 +252,7 @@ pub enum Auto {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Extrapolation {
-    /// The method.
+    /// The method; `pcf`, a constrained polynomial, is the only one yet.
     pub method: ExtrapolationMethod,
     /// How far, s; 0 for none.
     pub horizon_s: f64,
@@ -245,11 +260,13 @@ pub struct Extrapolation {
     pub order: usize,
     /// Length of the stretch that it is fitted to, s; default: 1.4, or 12 median intervals of the slowest source.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = 1.4)]
     pub window_s: Option<f64>,
     /// Whether jerk and snap are kept small; without, it is the paper's plain least squares.
     pub prior: bool,
-    /// Height at which it stops, m: the surface, say.
+    /// Height at which it stops, m: the surface, say; default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = 0.0)]
     pub stop_z_m: Option<f64>,
 }
 
@@ -280,8 +297,10 @@ pub enum ExtrapolationMethod {
 #[serde(deny_unknown_fields)]
 pub struct CharacteristicPoint {
     /// What to call it.
+    #[schemars(example = &"exit")]
     pub name: String,
     /// The height, m, Z up.
+    #[schemars(example = -2.0)]
     pub z_m: f64,
 }
 

@@ -7,7 +7,7 @@ use crate::track::Phase;
 /// A source has stopped seeing when it misses this many of its usual intervals in a row.
 ///
 /// 10: bursts of about five lost samples are usual with acoustics and are no change of phase. A guess.
-const OUTAGE_INTERVALS: f64 = 10.0;
+pub(crate) const OUTAGE_INTERVALS: f64 = 10.0;
 
 /// When each source sees the vehicle.
 #[derive(Clone, Debug, PartialEq)]

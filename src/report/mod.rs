@@ -1,7 +1,12 @@
 //! What is to be said of a result: one value, rendered as text for people or as JSON for programs.
 
+mod amount;
+pub mod inspection;
+mod proposal;
 mod text;
 
+pub use inspection::render_inspection;
+pub use proposal::InitReport;
 pub use text::render;
 
 use schemars::JsonSchema;
@@ -352,15 +357,19 @@ impl SourceReport {
 mod tests {
     use std::path::Path;
 
-    #[test]
-    fn the_schema_in_the_tree_is_the_one_of_this_code() {
-        let schema =
-            serde_json::to_string_pretty(&schemars::schema_for!(super::Report)).expect("a schema is JSON");
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas/fuse.schema.json");
+    /// Fails where `schemas/<command>.schema.json` is not this schema.
+    pub(super) fn assert_schema(schema: &schemars::Schema, command: &str) {
+        let schema = serde_json::to_string_pretty(schema).expect("a schema is JSON");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("schemas/{command}.schema.json"));
         if std::env::var_os("TRACKFUSE_UPDATE_SCHEMAS").is_some() {
             std::fs::write(&path, format!("{schema}\n")).expect("the tree can be written");
         }
-        let stored = std::fs::read_to_string(&path).expect("schemas/fuse.schema.json");
+        let stored = std::fs::read_to_string(&path).expect("a schema of this command");
         assert!(stored.trim_end() == schema, "it differs; TRACKFUSE_UPDATE_SCHEMAS=1 writes it anew");
+    }
+
+    #[test]
+    fn the_schema_in_the_tree_is_the_one_of_this_code() {
+        assert_schema(&schemars::schema_for!(super::Report), "fuse");
     }
 }
