@@ -228,6 +228,15 @@ mod tests {
     }
 
     #[test]
+    fn of_several_paths_the_first_is_in_force() {
+        let (table, config) = tether();
+        let positions = [table.positions.clone(), vec!["/another.position".into()]].concat();
+        let text = template(&[], &[SourceTable { positions, ..table }]);
+        assert_eq!(parse(&text).source, [config]);
+        assert!(text.contains("\n#position = \"/another.position\"\n"), "{text}");
+    }
+
+    #[test]
     fn default_lines_put_in_force_are_the_defaults() {
         let (table, config) = tether();
         let text = uncommented(&template(&[], &[table]), |line| !line.ends_with(EXAMPLE));

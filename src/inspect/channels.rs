@@ -6,6 +6,7 @@ use super::BUDGET_BYTES;
 use super::rhythm::Told;
 use super::seconds_between;
 use crate::config::SourceConfig;
+use crate::estimate::coverage;
 use crate::log::{Excerpt, Index, Log, TimesRead};
 use crate::report::inspection::{ChannelReport, ClockReport, Role, TimesReport, Unusable};
 use crate::source::{self, Candidate, Glimpse, Judged, Judgement, Recognised, Unfit};
@@ -126,6 +127,7 @@ fn clock(glimpse: &Glimpse) -> Option<ClockReport> {
     Some(ClockReport {
         messages_read: glimpse.messages,
         clock: seen.timing.clock.clone(),
+        rate_hz: coverage::median_interval_s(&seen.source).map(f64::recip),
         delay_s: seen.timing.delay_s,
         delay_spread_s: seen.timing.delay_spread_s,
         delay_growth_s: seen.timing.delay_growth_s,

@@ -147,6 +147,14 @@ mod tests {
     }
 
     #[test]
+    fn times_are_in_file_order_though_the_index_is_sorted_by_time() {
+        let entry = |time: u64, offset: u64| [time.to_le_bytes(), offset.to_le_bytes()].concat();
+        let entries_of = [entry(5, 70), entry(6, 30), entry(9, 50)].concat();
+        let body = [&[2, 0, 48, 0, 0, 0][..], &entries_of].concat();
+        assert_eq!(entries(&body), Some((2, vec![6, 9, 5])));
+    }
+
+    #[test]
     fn an_index_that_is_no_index_counts_as_none() {
         assert_eq!(
             entries(&[1, 0, 16, 0, 0, 0, 7, 0, 0, 0, 0, 0, 0, 0, 3, 0, 0, 0, 0, 0, 0, 0]),

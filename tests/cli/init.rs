@@ -4,6 +4,7 @@ use std::fs;
 
 use serde_json::{Value, json};
 
+use super::output::validate;
 use super::trial::{Output, Trial, assert_says, logs, trackfuse};
 use super::trial_log::{Sensor, TrialLog, changed, two_sensors};
 
@@ -190,4 +191,6 @@ fn init_as_json_is_one_object_with_the_config_in_it() {
         "position": "/tether/track.position", "velocity": "/tether/track.velocity"
     });
     assert_eq!(report["sources"], json!([source]));
+    let schema: Value = serde_json::from_str(include_str!("../../schemas/init.schema.json")).unwrap();
+    validate(&report, &schema, &schema, "report");
 }

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use mcap::WriteOptions;
 use serde_json::{Value, json};
 
+use super::output::validate;
 use super::trial::{Trial, assert_says, logs, trackfuse};
 use super::trial_log::{EPOCH_NS, Sensor, TrialLog, ns, stamp, two_sensors};
 
@@ -17,7 +18,10 @@ fn inspect(log: impl AsRef<[u8]>, code: i32) -> (String, Value) {
     let json = trackfuse(trial.folder(), &["inspect", "in.mcap", "--json", "--quiet"]);
     assert_eq!((text.code, json.code), (code, code), "{text:#?}");
     assert_eq!(text.stderr.is_empty(), code == 0, "{text:#?}");
-    (text.stdout, serde_json::from_str(&json.stdout).unwrap())
+    let report = serde_json::from_str(&json.stdout).unwrap();
+    let schema: Value = serde_json::from_str(include_str!("../../schemas/inspect.schema.json")).unwrap();
+    validate(&report, &schema, &schema, "report");
+    (text.stdout, report)
 }
 
 fn channel<'v>(report: &'v Value, topic: &str) -> &'v Value {
@@ -115,6 +119,48 @@ fn inspect_notices_clocks_that_differ_drift_or_go_back() {
     assert_says(&text, &["warning: /tether/track: times go back by up to 3.0 s"]);
     let (text, _) = inspect(epoch.finish(), 0);
     assert_says(&text, &["fuse        would refuse: ", "clocks are of different epochs", "20035 days ± 0.0"]);
+}
+
+#[test]
+fn inspect_notices_sources_that_never_meet_and_those_that_come_in_bursts() {
+    let mut log = TrialLog::new();
+    log.sensor("/tether/track", &Sensor::new(0.0, 4.0, 1));
+    log.sensor("/beacon/track", &Sensor::new(6.0, 10.0, 2));
+    let (text, _) = inspect(log.finish(), 0);
+    assert_says(&text, &["note: tether and beacon are never recorded at the same time"]);
+    let mut log = TrialLog::new();
+    for (i, (_, message)) in Sensor::new(0.0, 40.0, 1).messages().into_iter().enumerate() {
+        // ten at a time, twice a second
+        log.json("/tether/track", (i / 10) as f64 * 0.5 + (i % 10) as f64 * 0.001, &message);
+    }
+    let (text, _) = inspect(log.finish(), 0);
+    assert_says(&text, &["note: /tether/track: recorded in bursts: 1000.000 Hz by the median interval, 20."]);
+    let mut log = TrialLog::new();
+    log.sensor("/tether/track", &Sensor::new(0.0, 4.0, 1));
+    log.sensor("/beacon/track", &Sensor::new(2.0, 10.0, 2));
+    assert!(!inspect(log.finish(), 0).0.contains("note: "));
+}
+
+#[test]
+fn inspect_warns_of_a_summary_that_counts_wrong() {
+    let mut log = TrialLog::new();
+    log.sensor("/tether/track", &Sensor::new(0.0, 8.0, 1));
+    let mut bytes = log.finish();
+    // The statistics end with a map of one channel: its length in bytes, id, count.
+    let is_map = |w: &[u8]| w[..4] == 10_u32.to_le_bytes() && w[6..] == 161_u64.to_le_bytes();
+    let at = bytes.windows(14).rposition(is_map).unwrap();
+    bytes[at + 6] = 160;
+    let crc = bytes.len() - 12;
+    bytes[crc..crc + 4].fill(0);
+    let (text, report) = inspect(bytes, 3);
+    assert_says(
+        &text,
+        &[
+            "warning: there are other numbers of messages than the summary says: /tether/track: 161, not 160\n",
+        ],
+    );
+    assert_says(&text, &["checksums   right: "]);
+    assert_eq!(report["checksums"]["summary"], "none");
 }
 
 #[test]

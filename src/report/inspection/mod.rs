@@ -209,7 +209,8 @@ pub struct TimesReport {
     pub last_ns: String,
     /// Both, s since the log's first message.
     pub span_s: (f64, f64),
-    /// Messages a second, by the median interval between distinct times.
+    /// Messages a second, by the median interval between distinct times; where these scatter much, the samples'
+    /// own clock tells better.
     pub rate_hz: Option<f64>,
     /// Half the width of the middle 68 % of the intervals, s.
     pub jitter_s: Option<f64>,
@@ -234,6 +235,8 @@ pub struct ClockReport {
     pub messages_read: usize,
     /// What times the samples: `stamp`, `publish` or `log`, or several with `+`.
     pub clock: String,
+    /// Samples a second, by the median interval between those times.
+    pub rate_hz: Option<f64>,
     /// Median of log time less that time, s.
     pub delay_s: f64,
     /// Half the width of the middle 68 % of it, s.

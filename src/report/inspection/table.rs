@@ -88,13 +88,14 @@ impl Layout {
             write!(out, "  {name:<topic$} ")?;
         }
         let times = channel.times.as_ref();
+        let rate_hz = channel.clock.as_ref().and_then(|c| c.rate_hz).or(times.and_then(|t| t.rate_hz));
         let text = |value: Option<String>| value.unwrap_or_else(|| "-".into());
         writeln!(
             out,
             "{:<width$} {:>8} {:>6} {:>6} {:>15} {:>11}  {}",
             end_of(&self.kind(channel), width),
             channel.messages.map_or("?".into(), |n| n.to_string()),
-            text(times.and_then(|t| t.rate_hz).map(rate)),
+            text(rate_hz.map(rate)),
             text(times.and_then(|t| t.jitter_s).map(milliseconds)),
             text(times.map(|t| span(t.span_s))),
             text(times.and_then(|t| Some(format!("{}, {}", t.gaps, brief(t.longest_gap_s?))))),
