@@ -105,8 +105,8 @@ pub struct Inspect {
 #[command(after_help = "Example:
   trackfuse init dive.mcap -o dive.toml && trackfuse fuse dive.mcap --config dive.toml
 
-Exit codes: 0 done; 1 failed, nothing written; 2 output exists; 3 done, with warnings that a person must
-read: the config may name no source before one was chosen in it")]
+Exit codes: 0 done; 1 failed, nothing written; 2 output exists; 3 done, with warnings that a person
+must read, such as that the config names no source until one is chosen in it")]
 pub struct Init {
     /// The log to write a config for
     pub log: PathBuf,

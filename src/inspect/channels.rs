@@ -2,12 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use super::BUDGET_BYTES;
 use super::rhythm::Told;
-use super::seconds_between;
+use super::{BUDGET_BYTES, Extent, seconds_between};
 use crate::config::SourceConfig;
 use crate::estimate::coverage;
-use crate::log::{Excerpt, Index, Log, TimesRead};
+use crate::log::{Excerpt, Index, Log};
 use crate::report::inspection::{ChannelReport, ClockReport, Role, TimesReport, Unusable};
 use crate::source::{self, Candidate, Glimpse, Judged, Judgement, Recognised, Unfit};
 
@@ -37,11 +36,11 @@ pub(super) fn reports(
     judgement: &Judgement,
     recognised: Option<&Recognised>,
     rhythms: &BTreeMap<u16, Told>,
-    times: &TimesRead,
+    extent: Extent,
     glimpses: &BTreeMap<String, Glimpse>,
 ) -> Vec<ChannelReport> {
     let sources = recognised.map_or(&[][..], |r| r.sources.as_slice());
-    let start_ns = index.statistics.as_ref().map_or(0, |s| s.message_start_time);
+    let start_ns = extent.span.map_or(0, |span| span.0);
     let mut reports: Vec<ChannelReport> = judgement
         .channels
         .iter()
@@ -55,7 +54,7 @@ pub(super) fn reports(
             // Where not all was read, the statistics know better, and where all was, the other way round.
             let by_statistics = counted.and_then(|counts| counts.get(&judged.id).copied());
             let messages = match rhythm.map(|r| r.count) {
-                _ if times.unread > 0 => by_statistics,
+                _ if !extent.known => by_statistics,
                 count => Some(count.unwrap_or(0)),
             };
             Some(ChannelReport {
@@ -123,7 +122,7 @@ fn times_report(told: &Told, start_ns: u64) -> TimesReport {
 }
 
 fn clock(glimpse: &Glimpse) -> Option<ClockReport> {
-    let seen = glimpse.seen.as_ref().ok()?;
+    let seen = glimpse.seen.as_ref()?;
     Some(ClockReport {
         messages_read: glimpse.messages,
         clock: seen.timing.clock.clone(),

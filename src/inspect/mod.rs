@@ -35,15 +35,16 @@ pub fn inspect(log: &Log, prefix: &str) -> Inspection {
     let mut rhythms: BTreeMap<u16, Rhythm> = BTreeMap::new();
     let times = log.for_each_log_time(BUDGET_BYTES, |id, times| rhythms.entry(id).or_default().add(times));
     let rhythms: BTreeMap<u16, Told> = rhythms.into_iter().map(|(id, rhythm)| (id, rhythm.told())).collect();
+    let extent = Extent::of(index, &rhythms, &times);
     let judgement = source::judge(log, prefix);
     let recognised = judgement.sources();
     let (glimpses, excerpt) = channels::glimpses(log, &judgement);
     let channels =
-        channels::reports(index, &judgement, recognised.as_ref().ok(), &rhythms, &times, &glimpses);
+        channels::reports(index, &judgement, recognised.as_ref().ok(), &rhythms, extent, &glimpses);
     let mut inspection = Inspection {
         version: env!("CARGO_PKG_VERSION").into(),
         input: log.path().display().to_string(),
-        file: file(index),
+        file: file(index, extent),
         index: index_state(index, &times),
         checksums: checksums(index, &times, &excerpt),
         earlier_results: earlier_results(&judgement),
@@ -59,8 +60,35 @@ pub fn inspect(log: &Log, prefix: &str) -> Inspection {
     inspection
 }
 
-fn file(index: &Index) -> FileReport {
-    let statistics = index.statistics.as_ref().filter(|s| s.message_count > 0);
+/// How many messages there are, and their first and last log time, ns.
+#[derive(Clone, Copy, Debug, Default)]
+struct Extent {
+    messages: u64,
+    span: Option<(u64, u64)>,
+    /// Whether the times of all messages are known.
+    known: bool,
+}
+
+impl Extent {
+    /// Where all times are known, they tell; else the statistics.
+    fn of(index: &Index, rhythms: &BTreeMap<u16, Told>, times: &TimesRead) -> Self {
+        if times.missing() == 0 {
+            let spans = rhythms.values().map(|told| told.span);
+            return Self {
+                messages: rhythms.values().map(|told| told.count).sum(),
+                span: spans.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))),
+                known: true,
+            };
+        }
+        index.statistics.as_ref().map_or_else(Self::default, |s| Self {
+            messages: s.message_count,
+            span: (s.message_count > 0).then_some((s.message_start_time, s.message_end_time)),
+            known: false,
+        })
+    }
+}
+
+fn file(index: &Index, extent: Extent) -> FileReport {
     let mut compressions: BTreeMap<&str, CompressionReport> = BTreeMap::new();
     for chunk in &index.chunks {
         let name = if chunk.compression.is_empty() { "none" } else { chunk.compression.as_str() };
@@ -78,10 +106,10 @@ fn file(index: &Index) -> FileReport {
         bytes: index.file_len,
         profile: index.profile.clone(),
         library: index.library.clone(),
-        start_ns: statistics.map(|s| s.message_start_time.to_string()),
-        end_ns: statistics.map(|s| s.message_end_time.to_string()),
-        duration_s: statistics.map(|s| seconds_between(s.message_start_time, s.message_end_time)),
-        messages: statistics.map_or(0, |s| s.message_count),
+        start_ns: extent.span.map(|span| span.0.to_string()),
+        end_ns: extent.span.map(|span| span.1.to_string()),
+        duration_s: extent.span.map(|span| seconds_between(span.0, span.1)),
+        messages: extent.messages,
         chunks: index.chunks.len(),
         compressions: compressions.into_values().collect(),
         attachments: index.attachments.len(),
@@ -105,7 +133,7 @@ fn index_state(index: &Index, times: &TimesRead) -> IndexReport {
             .iter()
             .filter(|c| !c.message_index_offsets.is_empty())
             .count(),
-        parts_without_times: times.unread,
+        parts_without_times: times.missing(),
     }
 }
 

@@ -6,7 +6,7 @@ use crate::log::{Index, LogError};
 use crate::printable::printable;
 use crate::report::inspection::{ChannelReport, ClockReport, Inspection, Role, TimesReport};
 use crate::resolve;
-use crate::source::{Glimpse, Loaded, Recognised};
+use crate::source::{Glimpse, Loaded, Recognised, SourceError};
 use crate::time::Time;
 
 /// How many topics a sentence names.
@@ -30,44 +30,72 @@ pub(super) fn warn<'a>(
     warnings.extend(undated(inspection));
     warnings.extend(recognised.map_or(&[][..], |r| r.warnings.as_slice()).iter().cloned());
     let mut loaded: Vec<Loaded> = Vec::new();
+    let mut refusals = Vec::new();
     for channel in inspection.channels.iter().filter(|c| c.role == Role::Source) {
-        match glimpses.get(&channel.topic).map(|g| (g.messages, &g.seen)) {
-            Some((_, Ok(seen))) if loaded.iter().all(|l| l.source.name != seen.source.name) => {
-                loaded.push(seen.clone());
-            }
-            Some((0, Err(error))) => inspection.fuse.refusals.push(error.to_string()),
-            Some((messages, Err(error))) => {
-                let part = Some(messages as u64) != channel.messages;
-                let of = if part { format!(", as far as {messages} messages tell") } else { String::new() };
-                warnings.push(format!("{error}{of}"));
-            }
-            _ => {}
+        let Some(glimpse) = glimpses.get(&channel.topic) else { continue };
+        let all = channel.messages.is_some_and(|n| glimpse.messages as u64 >= n);
+        let of =
+            if all { String::new() } else { format!(" (of {} messages that were read)", glimpse.messages) };
+        let lacks = glimpse.lacks.iter().map(SourceError::to_string);
+        if glimpse.refused {
+            refusals.extend(lacks.clone());
+            warnings.extend(lacks);
+        } else {
+            warnings.extend(lacks.map(|lack| lack + &of));
+        }
+        // several channels may have one topic
+        if let Some(seen) = &glimpse.seen
+            && loaded.iter().all(|l| l.source.name != seen.source.name)
+        {
+            let warnings = seen.warnings.iter().map(|w| format!("{w}{of}")).collect();
+            loaded.push(Loaded { warnings, ..seen.clone() });
         }
     }
     if let Some(datum) = loaded.first() {
         let shift_s = resolve::log_time_shift_s(datum);
-        match resolve::check_epochs(&loaded, 0) {
-            Err(error) => inspection.fuse.refusals.push(error.to_string()),
-            Ok(()) => warnings.extend(resolve::warnings_of(&loaded, shift_s)),
+        if let Err(error) = resolve::check_epochs(&loaded, 0) {
+            refusals.push(error.to_string());
+            warnings.push(error.to_string());
+        } else {
+            warnings.extend(resolve::warnings_of(&loaded, shift_s));
         }
     }
+    inspection.fuse.refusals.extend(refusals);
     inspection.warnings = warnings;
 }
 
-/// Channels whose messages are not as many as the summary says.
-fn miscounted(inspection: &Inspection, index: &Index) -> Option<String> {
-    let statistics = index.statistics.as_ref()?;
-    if inspection.index.parts_without_times > 0 || statistics.channel_message_counts.is_empty() {
-        return None;
+/// What the summary says of the messages' numbers and times and is not so.
+fn miscounted(inspection: &Inspection, index: &Index) -> Vec<String> {
+    let Some(statistics) = &index.statistics else { return Vec::new() };
+    if inspection.index.parts_without_times > 0 {
+        return Vec::new();
     }
-    let wrong = inspection.channels.iter().filter_map(|channel| {
-        let counted = channel.messages?;
-        let claimed = statistics.channel_message_counts.get(&channel.id).copied().unwrap_or(0);
-        (counted != claimed).then(|| format!("{}: {counted}, not {claimed}", printable(&channel.topic)))
-    });
-    let wrong: Vec<String> = wrong.collect();
-    (!wrong.is_empty())
-        .then(|| format!("there are other numbers of messages than the summary says: {}", some_of(&wrong)))
+    let mut wrong = Vec::new();
+    if !statistics.channel_message_counts.is_empty() {
+        let numbers = inspection.channels.iter().filter_map(|channel| {
+            let counted = channel.messages?;
+            let claimed = statistics.channel_message_counts.get(&channel.id).copied().unwrap_or(0);
+            (counted != claimed).then(|| format!("{}: {counted}, not {claimed}", name(channel)))
+        });
+        let numbers: Vec<String> = numbers.collect();
+        if !numbers.is_empty() {
+            let numbers = some_of(&numbers);
+            wrong.push(format!("there are other numbers of messages than the summary says: {numbers}"));
+        }
+    }
+    let ns = |text: &String| text.parse::<u64>().ok();
+    let times = || inspection.channels.iter().filter_map(|c| c.times.as_ref());
+    let first = times().filter_map(|t| ns(&t.first_ns)).min();
+    let last = times().filter_map(|t| ns(&t.last_ns)).max();
+    if let (Some(first), Some(last)) = (first, last)
+        && (first, last) != (statistics.message_start_time, statistics.message_end_time)
+    {
+        let (start, end) = (statistics.message_start_time, statistics.message_end_time);
+        wrong.push(format!(
+            "messages are of {first} .. {last} ns, not of {start} .. {end} ns, as the summary says"
+        ));
+    }
+    wrong
 }
 
 /// A log that holds dates, and log times that are none.
@@ -96,6 +124,7 @@ pub(super) fn notes(inspection: &Inspection) -> Vec<String> {
         notes.extend(of_clock(channel, clock));
     }
     for (channel, times) in times().filter(|(c, _)| c.role != Role::Other) {
+        notes.extend(of_gaps(channel, times).filter(|_| channel.role == Role::Source));
         notes.extend(of_bursts(channel, times));
     }
     let mut count = |what: &str, of: fn(&TimesReport) -> Option<String>| {
@@ -170,6 +199,12 @@ fn of_clock(channel: &ChannelReport, clock: &ClockReport) -> Vec<String> {
         ));
     }
     notes
+}
+
+/// When a source was silent.
+fn of_gaps(channel: &ChannelReport, times: &TimesReport) -> Option<String> {
+    let (length_s, at_s) = times.longest_gap_s.zip(times.longest_gap_at_s)?;
+    Some(format!("{}: the longest gap is {} from {at_s:.2} s on", name(channel), duration(length_s)))
 }
 
 /// A median interval that says nothing of the whole.

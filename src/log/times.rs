@@ -26,6 +26,14 @@ pub struct TimesRead {
     pub damaged: Vec<LogError>,
 }
 
+impl TimesRead {
+    /// Parts of the log whose times were not told.
+    #[must_use]
+    pub fn missing(&self) -> usize {
+        self.unread + self.damaged.len()
+    }
+}
+
 impl Log {
     /// Hands the log times, ns, of each channel's messages to `f`, in file order and chunk by chunk.
     ///

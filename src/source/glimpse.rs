@@ -11,9 +11,12 @@ use crate::log::{Excerpt, Log};
 pub struct Glimpse {
     /// How many messages were read.
     pub messages: usize,
-    /// What they say, or what stands against using the source as far as they tell: the rest of the log may
-    /// have what they lack.
-    pub seen: Result<Loaded, SourceError>,
+    /// What they say; `None` where it is nothing.
+    pub seen: Option<Loaded>,
+    /// What they lack of what the source's paths ask for; the rest of the log may have it.
+    pub lacks: Vec<SourceError>,
+    /// Whether no message could be read, since the paths don't fit the channel.
+    pub refused: bool,
 }
 
 /// Reads of each of `configs` what lies in an excerpt of about `budget_bytes` of the log: see
@@ -42,19 +45,24 @@ pub fn glimpse(log: &Log, configs: &[SourceConfig], budget_bytes: u64) -> (Vec<G
     });
     let mut gathered = gathered.into_iter();
     let glimpses = refused.into_iter().filter_map(|error| match error {
-        Some(error) => Some(Glimpse { messages: 0, seen: Err(error) }),
-        None => gathered.next().map(seen),
+        Some(error) => Some(Glimpse { messages: 0, seen: None, lacks: vec![error], refused: true }),
+        None => gathered.next().map(Glimpse::of),
     });
     (glimpses.collect(), excerpt)
 }
 
-fn seen(mut source: Gathered) -> Glimpse {
-    let messages = source.messages;
-    let seen = if let Some((_, error)) = source.lack() {
-        Err(error)
-    } else {
-        let origin = source.median_time();
-        Ok(source.finish(origin))
-    };
-    Glimpse { messages, seen }
+impl Glimpse {
+    fn of(mut source: Gathered) -> Self {
+        let messages = source.messages;
+        let mut lacks = Vec::new();
+        while let Some((quantity, error)) = source.lack() {
+            source.drop(quantity);
+            lacks.push(error);
+        }
+        let seen = (!source.paths.is_empty()).then(|| {
+            let origin = source.median_time();
+            source.finish(origin)
+        });
+        Self { messages, seen, lacks, refused: false }
+    }
 }

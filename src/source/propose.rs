@@ -78,7 +78,7 @@ pub fn propose(log: &Log, prefix: &str) -> Result<Proposal, SourceError> {
 /// a look at some does not show that they hold everything.
 fn kept(log: &Log, sources: &[SourceConfig]) -> Result<(Vec<SourceConfig>, Vec<String>), SourceError> {
     let (glimpses, excerpt) = glimpse(log, sources, BUDGET_BYTES);
-    if excerpt.damaged.is_empty() && glimpses.iter().all(|g| g.seen.is_ok()) {
+    if excerpt.damaged.is_empty() && glimpses.iter().all(|g| g.lacks.is_empty()) {
         return Ok((sources.to_vec(), Vec::new()));
     }
     let (loaded, _, left_out) = load(log, sources, false)?;

@@ -88,7 +88,10 @@ fn inspect_finds_gaps_jitter_and_the_delay_of_stamps() {
     assert!((number("clock", "delay_s") - 0.1).abs() < 1e-9);
     assert!((number("clock", "delay_spread_s") - 0.008).abs() < 1e-9);
     assert_eq!((&tether["clock"]["clock"], &tether["clock"]["frame_id"]), (&json!("stamp"), &json!("enu")));
-    assert_says(&text, &["2, 5.0", "100.0 ± 8.0"]);
+    assert_says(
+        &text,
+        &["2, 5.0", "100.0 ± 8.0", "note: /tether/track: the longest gap is 5.1 s from 19.94 s"],
+    );
 }
 
 #[test]
@@ -117,7 +120,7 @@ fn inspect_notices_clocks_that_differ_drift_or_go_back() {
     }
     let (text, _) = inspect(back.finish(), 3);
     assert_says(&text, &["warning: /tether/track: times go back by up to 3.0 s"]);
-    let (text, _) = inspect(epoch.finish(), 0);
+    let (text, _) = inspect(epoch.finish(), 3);
     assert_says(&text, &["fuse        would refuse: ", "clocks are of different epochs", "20035 days ± 0.0"]);
 }
 
@@ -321,6 +324,30 @@ fn inspect_and_init_that_cannot_print_their_result_fail() {
         assert_eq!(done.status.code(), Some(1));
         assert_says(&String::from_utf8(done.stderr).unwrap(), &["error: the result can't be printed: "]);
     }
+}
+
+#[test]
+fn inspect_warns_of_what_a_source_lacks_and_shows_the_rest() {
+    let mut log = TrialLog::new();
+    for (t, mut message) in Sensor::new(0.0, 8.0, 1).messages() {
+        message["velocity"] = Value::Null;
+        if t < 1.0 {
+            message["position"]["x"] = Value::Null;
+        }
+        log.json("/tether/track", t, &message);
+        log.json("/beacon/status", t, &json!({"quality": 1}));
+    }
+    let (text, report) = inspect(log.finish(), 3);
+    assert_says(
+        &text,
+        &[
+            "warning: source \"/tether/track\": /tether/track.velocity is null in all 161 messages",
+            "warning: /tether/track: 181 samples are left out: no vector at the path\n",
+            "warning: /beacon/status looks like a sensor's and is not used: no position or velocity in quality\n",
+            "0.0 ± 0.0",
+        ],
+    );
+    assert_eq!(report["fuse"]["refusals"], json!([]));
 }
 
 fn everything() -> Vec<PathBuf> {

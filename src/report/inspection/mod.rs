@@ -96,7 +96,8 @@ pub struct IndexReport {
     pub scanned: bool,
     /// Chunks with message indexes.
     pub chunks_with_message_index: usize,
-    /// Parts of the log that were too large to be read for want of a message index: times and counts lack them.
+    /// Parts of the log without message index that are damaged, or too large together to be read for it: times
+    /// lack them.
     pub parts_without_times: usize,
 }
 

@@ -122,7 +122,7 @@ fn index_state(index: &IndexReport, chunks: usize) -> String {
         state.push(format!("{} of {chunks} chunks have message indexes", index.chunks_with_message_index));
     }
     if index.parts_without_times > 0 {
-        state.push("too much to read for want of them: times below are not of all messages".into());
+        state.push("too much to be read for that, or damaged: times below are not of all messages".into());
     }
     if state.is_empty() { "complete".into() } else { state.join("; ") }
 }
