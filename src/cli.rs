@@ -34,6 +34,12 @@ pub enum Command {
     Export(Export),
     /// Make a log with known truth from a scenario file
     Simulate(Simulate),
+    /// Show what is in a log: channels, rates, gaps, clocks, sources, and what is wrong with it
+    ///
+    /// Of a large log no more is read than that takes: some seconds for 50 GB.
+    Inspect(Inspect),
+    /// Write a commented config for a log: its sources, and every other key with its default
+    Init(Init),
 }
 
 /// How a command talks.
@@ -151,4 +157,38 @@ pub struct Export {
 pub enum Format {
     /// Comma-separated values; every column's name holds its unit
     Csv,
+}
+
+/// Arguments of `inspect`.
+#[derive(Args, Debug)]
+#[command(
+    after_help = "Exit codes: 0 done; 1 the log can't be opened; 3 done, with warnings that a person must read"
+)]
+pub struct Inspect {
+    /// The log to look into
+    pub log: PathBuf,
+    /// How to talk.
+    #[command(flatten)]
+    pub voice: Voice,
+}
+
+/// Arguments of `init`.
+#[derive(Args, Debug)]
+#[command(after_help = "Example:
+  trackfuse init dive.mcap -o dive.toml && trackfuse fuse dive.mcap --config dive.toml
+
+Exit codes: 0 done; 1 failed, nothing written; 2 output exists; 3 done, with warnings that a person
+must read, such as that the config names no source until one is chosen in it")]
+pub struct Init {
+    /// The log to write a config for
+    pub log: PathBuf,
+    /// The config to write [default: stdout]
+    #[arg(long, short, value_name = "CONFIG")]
+    pub output: Option<PathBuf>,
+    /// Replace an existing output
+    #[arg(long)]
+    pub force: bool,
+    /// How to talk.
+    #[command(flatten)]
+    pub voice: Voice,
 }

@@ -21,7 +21,8 @@
 //!
 //! Who may know whom: [`commands`] everything; [`log`], [`estimate`], [`report`] the shared nouns ([`sample`],
 //! [`track`], [`time`]); [`estimate`] also [`math`]; [`math`] nothing of ours. [`fusion`] is the order of the
-//! estimators, [`publish`] the result as messages, [`simulate`] makes logs with known truth.
+//! estimators, [`publish`] the result as messages, [`inspect`] tells what is in a log, [`simulate`] makes logs
+//! with known truth.
 #![forbid(unsafe_code)]
 
 pub mod cli;
@@ -29,6 +30,7 @@ pub mod commands;
 pub mod config;
 pub mod estimate;
 pub mod fusion;
+pub mod inspect;
 pub mod log;
 pub mod math;
 mod printable;

@@ -12,6 +12,8 @@ fn main() -> ExitCode {
         Command::Compare(args) => commands::compare(args),
         Command::Export(args) => commands::export(args),
         Command::Simulate(args) => commands::simulate(args),
+        Command::Inspect(args) => commands::inspect(args),
+        Command::Init(args) => commands::init(args),
     };
     match done {
         Ok(outcome) => outcome.into(),

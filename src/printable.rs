@@ -33,6 +33,16 @@ pub(crate) fn toml_string(text: &str) -> String {
     quoted
 }
 
+/// The text as one word of a POSIX shell's command line, free of what steers a terminal.
+pub(crate) fn shell_word(text: &str) -> String {
+    let text = printable(text);
+    let plain = |c: char| c.is_alphanumeric() || "/._-+:,=@%".contains(c);
+    if !text.is_empty() && text.chars().all(plain) {
+        return text.into_owned();
+    }
+    format!("'{}'", text.replace('\'', "'\\''"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -51,5 +61,12 @@ mod tests {
             let table: toml::Table = toml::from_str(&format!("t = {quoted}")).expect("TOML");
             assert_eq!(table["t"].as_str(), Some(text));
         }
+    }
+
+    #[test]
+    fn a_shell_takes_the_word_as_one() {
+        assert_eq!(shell_word("/a/dive-2.mcap"), "/a/dive-2.mcap");
+        assert_eq!(shell_word("my dive's.mcap"), r"'my dive'\''s.mcap'");
+        assert_eq!(shell_word(""), "''");
     }
 }

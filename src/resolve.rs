@@ -161,7 +161,7 @@ pub fn first_sample(datum: &Source, fusion: &Fusion, origin: Time) -> Time {
 }
 
 /// Clocks that differ by more than this count from different epochs.
-const DIFFERENT_EPOCHS_S: f64 = 3600.0;
+pub(crate) const DIFFERENT_EPOCHS_S: f64 = 3600.0;
 
 /// Seconds between the datum's clock and the log's, where they are clocks of different epochs.
 #[must_use]
@@ -185,7 +185,10 @@ fn surface_at_zero(sources: &[Source]) -> bool {
 }
 
 /// An error where a source's clock is of another epoch than the datum's: no track can hold both.
-fn check_epochs(loaded: &[Loaded], datum: usize) -> Result<(), ResolveError> {
+///
+/// # Errors
+/// [`ResolveError::Epochs`].
+pub fn check_epochs(loaded: &[Loaded], datum: usize) -> Result<(), ResolveError> {
     let of_datum = &loaded[datum];
     let apart_s = |other: &Loaded| (other.timing.delay_s - of_datum.timing.delay_s).abs();
     match loaded.iter().find(|l| apart_s(l) > DIFFERENT_EPOCHS_S) {

@@ -13,6 +13,8 @@ mod cli {
     mod compare;
     mod exit_code;
     mod export;
+    mod init;
+    mod inspect;
     mod output;
     mod readme;
     mod real_logs;

@@ -1,6 +1,6 @@
 //! `trackfuse compare`: a track of a log against a reference channel of it.
 
-use super::{CommandError, Outcome, say};
+use super::{CommandError, Outcome, show};
 use crate::cli::Compare;
 use crate::estimate::characteristic_point::Height;
 use crate::log::Log;
@@ -48,7 +48,7 @@ pub fn compare(args: &Compare) -> Result<Outcome, CommandError> {
         comparison: &comparison,
         warnings: &warnings,
     });
-    say(args.voice, &render_comparison(&report), &report, &warnings);
+    show(args.voice, &render_comparison(&report), &report, &warnings)?;
     Ok(if warnings.is_empty() { Outcome::Done } else { Outcome::Warned })
 }
 

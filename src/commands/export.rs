@@ -4,7 +4,7 @@ use std::io::{self, BufWriter, Write};
 
 use serde_json::json;
 
-use super::{CommandError, Outcome, say};
+use super::{CommandError, Outcome, say, show};
 use crate::cli::{Export, Format};
 use crate::log::{Log, LogError, write_new};
 use crate::report::csv;
@@ -50,13 +50,13 @@ pub fn export(args: &Export) -> Result<Outcome, CommandError> {
             "rows": rows,
             "warnings": warnings,
         });
-        say(args.voice, "", &table, warnings);
+        show(args.voice, "", &table, warnings)?;
     } else {
         let mut stdout = BufWriter::new(io::stdout().lock());
         match csv::write_csv(&recorded, t0, &mut stdout).and_then(|()| stdout.flush()) {
             // a reader that went away wants no more
             Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-                return Err(CommandError::Stdout { source: error });
+                return Err(CommandError::Print(error));
             }
             _ => {}
         }

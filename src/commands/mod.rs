@@ -3,11 +3,15 @@
 mod compare;
 mod export;
 mod fuse;
+mod init;
+mod inspect;
 mod simulate;
 
 pub use compare::compare;
 pub use export::export;
 pub use fuse::fuse;
+pub use init::init;
+pub use inspect::inspect;
 pub use simulate::simulate;
 
 use std::io::{self, IsTerminal, Write};
@@ -16,7 +20,7 @@ use std::process::ExitCode;
 use crate::cli::Voice;
 use crate::config::ConfigError;
 use crate::estimate::EstimateError;
-use crate::log::LogError;
+use crate::log::{LogError, WholePart};
 use crate::printable::printable;
 use crate::resolve::ResolveError;
 use crate::simulate::SimulateError;
@@ -41,6 +45,14 @@ pub enum CommandError {
     /// The log.
     #[error(transparent)]
     Log(#[from] LogError),
+    /// A log that can't be opened, and what is left of it.
+    #[error("{error}\n{whole}")]
+    Broken {
+        /// What is wrong with it.
+        error: LogError,
+        /// What is not.
+        whole: Box<WholePart>,
+    },
     /// The sources.
     #[error(transparent)]
     Source(#[from] SourceError),
@@ -67,12 +79,6 @@ pub enum CommandError {
         /// When the reference is.
         reference: String,
     },
-    /// The result can't be printed.
-    #[error("stdout: {source}")]
-    Stdout {
-        /// What the system said.
-        source: io::Error,
-    },
     /// A scenario, with its file.
     #[error("{path}: {error}")]
     Scenario {
@@ -81,6 +87,9 @@ pub enum CommandError {
         /// What is wrong with it.
         error: Box<SimulateError>,
     },
+    /// What was found can't be printed.
+    #[error("the result can't be printed: {0}")]
+    Print(io::Error),
     /// A file that is no log.
     #[error("{path}: {source}")]
     File {
@@ -97,7 +106,7 @@ impl CommandError {
     pub fn hint(&self) -> Option<String> {
         match self {
             Self::Config(error) => error.hint(),
-            Self::Log(error) => error.hint(),
+            Self::Log(error) | Self::Broken { error, .. } => error.hint(),
             Self::Source(error) => error.hint(),
             Self::Resolve(error) => Some(error.hint()),
             Self::NothingInCommon { .. } => {
@@ -116,10 +125,11 @@ impl CommandError {
             Self::Source(error) => error.is_usage(),
             Self::Simulate(error) => is_of_scenario(error),
             Self::Scenario { error, .. } => is_of_scenario(error),
-            Self::Estimate(_)
+            Self::Broken { .. }
+            | Self::Print(_)
+            | Self::Estimate(_)
             | Self::NotFinite { .. }
-            | Self::NothingInCommon { .. }
-            | Self::Stdout { .. } => false,
+            | Self::NothingInCommon { .. } => false,
         };
         if usage { 2 } else { 1 }
     }
@@ -156,9 +166,34 @@ pub fn explain(error: &CommandError) {
     }
 }
 
+/// Prints the summary of what a command wrote elsewhere: see [`print`].
+fn say(voice: Voice, text: &str, json: &impl serde::Serialize, warnings: &[String]) {
+    if let Err(error) = print(voice, text, json, warnings) {
+        let _ = writeln!(
+            io::stderr(),
+            "warning: the output is written, but its summary can't be printed: {error}"
+        );
+    }
+}
+
+/// Prints what a command is there to print: see [`print`].
+fn show(
+    voice: Voice,
+    text: &str,
+    json: &impl serde::Serialize,
+    warnings: &[String],
+) -> Result<(), CommandError> {
+    print(voice, text, json, warnings).map_err(CommandError::Print)
+}
+
 /// Prints a command's result on stdout, and its warnings on stderr where they would not be seen otherwise:
 /// the text holds them too.
-fn say(voice: Voice, text: &str, json: &impl serde::Serialize, warnings: &[String]) {
+fn print(
+    voice: Voice,
+    text: &str,
+    json: &impl serde::Serialize,
+    warnings: &[String],
+) -> Result<(), io::Error> {
     let mut stdout = io::stdout().lock();
     let printed = if voice.json {
         let json = serde_json::to_string_pretty(json).unwrap_or_default();
@@ -166,18 +201,13 @@ fn say(voice: Voice, text: &str, json: &impl serde::Serialize, warnings: &[Strin
     } else {
         write!(stdout, "{text}")
     };
-    match printed.and_then(|()| stdout.flush()) {
-        // a reader that went away wants no more
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            let _ = writeln!(
-                io::stderr(),
-                "warning: the output is written, but its summary can't be printed: {error}"
-            );
-        }
-        _ => {}
-    }
     if voice.json || !stdout.is_terminal() {
         warn(voice, warnings);
+    }
+    match printed.and_then(|()| stdout.flush()) {
+        // a reader that went away wants no more
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error),
+        _ => Ok(()),
     }
 }
 

@@ -29,6 +29,14 @@ impl Block<'_> {
         }
     }
 
+    /// How many bytes its records have, as far as the index tells.
+    pub(super) fn size(&self) -> u64 {
+        match self {
+            Self::Chunk(chunk) => chunk.uncompressed_size,
+            Self::Loose(range) => range.end - range.start,
+        }
+    }
+
     /// Whether a message of `channel` may be in it, as far as the index tells.
     pub(super) fn may_hold(&self, channel: u16) -> bool {
         match self {

@@ -8,7 +8,7 @@ use mcap::records::{
 };
 
 use super::file::{HEAD_LEN, Head, LogFile, parse};
-use super::{LogError, Obstacle, chunk, survey};
+use super::{LogError, Obstacle, chunk, output, survey};
 
 const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 const MAGIC_LEN: u64 = MAGIC.len() as u64;
@@ -53,6 +53,25 @@ pub(super) struct SummaryRecord {
     pub(super) bytes: Vec<u8>,
 }
 
+/// How much the summary left out, and was found in the data section.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LeftOut {
+    /// Schemas.
+    pub schemas: usize,
+    /// Channels.
+    pub channels: usize,
+    /// Chunk indexes.
+    pub chunks: usize,
+    /// Indexes of attachments.
+    pub attachments: usize,
+    /// Indexes of metadata records.
+    pub metadata: usize,
+    /// The statistics, which were counted.
+    pub statistics: bool,
+    /// Whether every chunk had to be read to find it all.
+    pub scanned: bool,
+}
+
 /// What is in a log, without its messages.
 #[derive(Clone, Debug, Default)]
 pub struct Index {
@@ -72,6 +91,8 @@ pub struct Index {
     pub metadata: Vec<MetadataIndex>,
     /// Counts and times as the summary has them, or counted where it has none.
     pub statistics: Option<Statistics>,
+    /// What of all this was not in the summary.
+    pub left_out: LeftOut,
     /// Where the first record after the header stands.
     pub data_start: u64,
     /// Where the `DataEnd` record stands: the bytes before it never change.
@@ -168,6 +189,17 @@ impl Log {
             None => Ok(()),
             Some(obstacle) => Err(LogError::NotAppendable { path: self.file.path.clone(), obstacle }),
         }
+    }
+
+    /// Refuses an output that is the log itself, by whatever link.
+    ///
+    /// # Errors
+    /// [`LogError::OutputIsInput`].
+    pub fn ensure_other(&self, out: &Path) -> Result<(), LogError> {
+        if output::is_same_file(&self.file.file, &self.file.path, out) {
+            return Err(LogError::OutputIsInput { path: out.to_owned() });
+        }
+        Ok(())
     }
 
     /// The bytes behind DataEnd: summary, footer and magic. They tell two logs apart that share a data section.
@@ -313,7 +345,7 @@ mod tests {
     use std::{collections::BTreeSet, panic::catch_unwind};
 
     use super::super::fixture::{PRIVATE, chunked, log, on_disk, records, without_summary_crc};
-    use super::super::{Appender, Compression};
+    use super::super::{Appender, Compression, WholePart};
     use super::*;
 
     fn open(bytes: &[u8]) -> Result<Log, LogError> {
@@ -324,9 +356,14 @@ mod tests {
     /// Opens, reads and appends; what fails must do so with an error.
     fn use_in_every_way(bytes: &[u8]) -> Result<(), LogError> {
         let (dir, path) = on_disk(bytes);
+        let _ = WholePart::of(&path).map(|whole| whole.to_string());
         let log = Log::open(path)?;
         let channels: BTreeSet<u16> = (0..4).collect();
-        log.first_messages(&channels)?;
+        log.for_each_log_time(u64::MAX, |_, _| {});
+        log.for_each_message_of_excerpt(&channels, 1, |_| {});
+        if let Some(error) = log.first_messages(&channels).1.pop() {
+            return Err(error);
+        }
         log.for_each_message(&channels, |_| Ok::<_, LogError>(()))?;
         Appender::begin(&log, dir.path().join("out.mcap"), false, &[], Compression::None)?.finish()?;
         Ok(())
@@ -406,6 +443,17 @@ mod tests {
         assert_eq!(found.attachments, expected.attachments);
         assert_eq!(found.metadata, expected.metadata);
         assert_eq!(found.statistics, expected.statistics);
+        assert_eq!(expected.left_out, LeftOut::default());
+        let counted = LeftOut {
+            schemas: 1,
+            channels: 2,
+            chunks: expected.chunks.len(),
+            attachments: 1,
+            metadata: 1,
+            statistics: true,
+            scanned: true,
+        };
+        assert_eq!(found.left_out, counted);
     }
 
     #[test]
@@ -437,7 +485,7 @@ mod tests {
             matches!(refused, LogError::NotAppendable { obstacle: Obstacle::Garbage { offset }, .. } if offset == private as u64),
             "{refused}"
         );
-        assert_eq!(log.first_messages(&[1, 2].into()).unwrap().len(), 2);
+        assert_eq!(log.first_messages(&[1, 2].into()).0.len(), 2);
     }
 
     #[test]

@@ -62,23 +62,17 @@ impl Log {
         mut f: impl FnMut(Message<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
         let wanted = |block: &chunk::Block<'_>| channels.iter().any(|&id| block.may_hold(id));
-        chunk::for_each_record(&self.file, self.blocks().into_iter().filter(wanted), |block, record| {
-            if record.opcode != op::MESSAGE {
-                return Ok(());
-            }
-            let message = message(&self.file, block, record.body)?;
+        self.for_each_message_of(self.blocks().into_iter().filter(wanted), |message| {
             if channels.contains(&message.channel_id) { f(message) } else { Ok(()) }
         })
     }
 
     /// The first message in the file of each of `channels` that has one, reading as few chunks as
-    /// that takes.
-    ///
-    /// # Errors
-    /// As [`Log::for_each_message`].
-    pub fn first_messages(&self, channels: &BTreeSet<u16>) -> Result<BTreeMap<u16, OwnedMessage>, LogError> {
+    /// that takes; and the parts that could not be read, which are passed over.
+    #[must_use]
+    pub fn first_messages(&self, channels: &BTreeSet<u16>) -> (BTreeMap<u16, OwnedMessage>, Vec<LogError>) {
         let mut missing = channels.clone();
-        let mut first = BTreeMap::new();
+        let (mut first, mut damaged) = (BTreeMap::new(), Vec::new());
         for block in self.blocks() {
             if missing.is_empty() {
                 break;
@@ -86,17 +80,27 @@ impl Log {
             if !missing.iter().any(|&id| block.may_hold(id)) {
                 continue;
             }
-            chunk::for_each_record(&self.file, [block], |block, record| {
-                if record.opcode == op::MESSAGE {
-                    let message = message(&self.file, block, record.body)?;
-                    if missing.remove(&message.channel_id) {
-                        first.insert(message.channel_id, message.into());
-                    }
+            let read = self.for_each_message_of([block], |message| {
+                if missing.remove(&message.channel_id) {
+                    first.insert(message.channel_id, message.into());
                 }
                 Ok::<_, LogError>(())
-            })?;
+            });
+            damaged.extend(read.err());
         }
-        Ok(first)
+        (first, damaged)
+    }
+
+    /// Hands all messages of `blocks` to `f`.
+    pub(super) fn for_each_message_of<'b, E: From<LogError>>(
+        &self,
+        blocks: impl IntoIterator<Item = chunk::Block<'b>>,
+        mut f: impl FnMut(Message<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        chunk::for_each_record(&self.file, blocks, |block, record| match record.opcode {
+            op::MESSAGE => f(message(&self.file, block, record.body)?),
+            _ => Ok(()),
+        })
     }
 }
 
@@ -135,7 +139,8 @@ mod tests {
             let log = Log::open(&path).unwrap();
             assert_eq!(times(&log, 2).unwrap(), [11, 13, 15, 17, 19]);
             assert!(times(&log, 9).unwrap().is_empty());
-            let first = log.first_messages(&[1, 2, 9].into()).unwrap();
+            let (first, damaged) = log.first_messages(&[1, 2, 9].into());
+            assert!(damaged.is_empty());
             assert_eq!(first.keys().copied().collect::<Vec<_>>(), [1, 2]);
             assert_eq!(first[&2].data, b"{\"i\":11}");
             assert_eq!(first[&2].publish_time, 11_000_000_001);
@@ -160,6 +165,12 @@ mod tests {
         }
         // `/b` is in later chunks only, so the bad one isn't even read.
         assert_eq!(times(&log, 2).unwrap().len(), 5);
+        let (first, damaged) = log.first_messages(&[1, 2].into());
+        assert_eq!(
+            (first.len(), damaged.len()),
+            (2, 1),
+            "the first message of `/a` is then one of a good chunk"
+        );
     }
 
     #[test]

@@ -18,6 +18,7 @@ mod append;
 mod chunk;
 pub mod decode;
 mod error;
+mod excerpt;
 mod file;
 #[cfg(test)]
 mod fixture;
@@ -27,11 +28,16 @@ mod messages;
 mod output;
 mod summary;
 mod survey;
+mod times;
+mod whole_part;
 
 pub use addition::{Compression, NewChannel, NewMessage, NewMetadata};
 pub use append::{Appender, Written};
 pub use error::{LogError, Obstacle};
-pub use index::{Index, Log, Schema};
+pub use excerpt::Excerpt;
+pub use index::{Index, LeftOut, Log, Schema};
 pub use mcap::records::{AttachmentIndex, Channel, ChunkIndex, MetadataIndex, Statistics};
 pub use messages::{Message, OwnedMessage};
 pub use output::write_new;
+pub use times::TimesRead;
+pub use whole_part::WholePart;

@@ -133,10 +133,7 @@ fn temporary_beside(out: &Path, like: Option<fs::Permissions>) -> io::Result<Nam
 
 /// Refuses an output before any work is done for it.
 pub(super) fn check_output(log: &Log, out: &Path, force: bool) -> Result<(), LogError> {
-    let path = || out.to_owned();
-    if is_same_file(&log.file.file, &log.file.path, out) {
-        return Err(LogError::OutputIsInput { path: path() });
-    }
+    log.ensure_other(out)?;
     check_name(out, force)
 }
 
@@ -157,7 +154,7 @@ fn check_name(out: &Path, force: bool) -> Result<(), LogError> {
 
 /// Whether `out` leads to the open file `input`, by whatever link.
 #[cfg(unix)]
-fn is_same_file(input: &File, _: &Path, out: &Path) -> bool {
+pub(super) fn is_same_file(input: &File, _: &Path, out: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
     let id = |metadata: &fs::Metadata| (metadata.dev(), metadata.ino());
     matches!((input.metadata(), fs::metadata(out)), (Ok(a), Ok(b)) if id(&a) == id(&b))
@@ -165,6 +162,6 @@ fn is_same_file(input: &File, _: &Path, out: &Path) -> bool {
 
 /// Whether `out` leads to the file at `input`, by its path.
 #[cfg(not(unix))]
-fn is_same_file(_: &File, input: &Path, out: &Path) -> bool {
+pub(super) fn is_same_file(_: &File, input: &Path, out: &Path) -> bool {
     matches!((input.canonicalize(), out.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }

@@ -12,7 +12,7 @@ use mcap::records::{
 
 use super::chunk::{self, Block};
 use super::file::{HEAD_LEN, Head, LogFile, parse};
-use super::index::{Schema, SummaryRecord, read_record};
+use super::index::{LeftOut, Schema, SummaryRecord, read_record};
 use super::summary::encode;
 use super::{Index, LogError, Obstacle};
 
@@ -24,6 +24,7 @@ const LONGEST_ATTACHMENT_HEADER: u64 = 1 << 20;
 /// Checks `index` against the file and adds what is missing. The answer is the first thing, if
 /// any, that stands against adding channels.
 pub(super) fn complete(file: &LogFile, index: &mut Index) -> Result<Option<Obstacle>, LogError> {
+    let summarised = counts(index);
     let known = check_extents(file, index)?;
     let mut gaps = Gaps { file, index, schemas: Vec::new(), loose: None, garbage: None };
     let mut position = gaps.index.data_start;
@@ -40,9 +41,20 @@ pub(super) fn complete(file: &LogFile, index: &mut Index) -> Result<Option<Obsta
     index.attachments.sort_by_key(|attachment| attachment.offset);
     index.metadata.sort_by_key(|metadata| metadata.offset);
 
-    if !is_complete(index) {
+    let scanned = !is_complete(index);
+    if scanned {
         scan(file, index)?;
     }
+    let found = counts(index);
+    index.left_out = LeftOut {
+        schemas: found.schemas.saturating_sub(summarised.schemas),
+        channels: found.channels.saturating_sub(summarised.channels),
+        chunks: found.chunks.saturating_sub(summarised.chunks),
+        attachments: found.attachments.saturating_sub(summarised.attachments),
+        metadata: found.metadata.saturating_sub(summarised.metadata),
+        statistics: found.statistics && !summarised.statistics,
+        scanned,
+    };
     if let Some(offset) = garbage {
         return Ok(Some(Obstacle::Garbage { offset }));
     }
@@ -50,6 +62,19 @@ pub(super) fn complete(file: &LogFile, index: &mut Index) -> Result<Option<Obsta
         return Ok(Some(Obstacle::LooseMessages { offset }));
     }
     first_without_message_index(file, index)
+}
+
+/// How much the index holds.
+fn counts(index: &Index) -> LeftOut {
+    LeftOut {
+        schemas: index.schemas.len(),
+        channels: index.channels.len(),
+        chunks: index.chunks.len(),
+        attachments: index.attachments.len(),
+        metadata: index.metadata.len(),
+        statistics: index.statistics.is_some(),
+        scanned: false,
+    }
 }
 
 /// Where the indexed parts of the data section stand, in order; each is what the index says.

@@ -5,6 +5,7 @@ pub mod chebyshev;
 mod elimination;
 pub mod gaussian_basis;
 pub mod least_squares;
+pub mod log_histogram;
 pub mod polyline;
 pub mod robust;
 pub mod scalar;

@@ -1,14 +1,19 @@
 //! What is to be said of a result: one value, rendered as text for people or as JSON for programs.
 
+mod amount;
 mod comparison;
 mod comparison_text;
 pub mod csv;
+pub mod inspection;
+mod proposal;
 mod text;
 
 pub use comparison::{
     ComparisonParts, ComparisonReport, Crossing, CrossingReport, PhaseErrors, ReferenceReport, WorstReport,
 };
 pub use comparison_text::render_comparison;
+pub use inspection::render_inspection;
+pub use proposal::InitReport;
 pub use text::render;
 
 use schemars::JsonSchema;
@@ -382,23 +387,20 @@ impl SourceReport {
 mod tests {
     use std::path::Path;
 
+    /// Fails where `schemas/<command>.schema.json` is not this schema.
+    pub(super) fn assert_schema(schema: &schemars::Schema, command: &str) {
+        let schema = serde_json::to_string_pretty(schema).expect("a schema is JSON");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("schemas/{command}.schema.json"));
+        if std::env::var_os("TRACKFUSE_UPDATE_SCHEMAS").is_some() {
+            std::fs::write(&path, format!("{schema}\n")).expect("the tree can be written");
+        }
+        let stored = std::fs::read_to_string(&path).expect("a schema of this command");
+        assert!(stored.trim_end() == schema, "it differs; TRACKFUSE_UPDATE_SCHEMAS=1 writes it anew");
+    }
+
     #[test]
     fn the_schemas_in_the_tree_are_those_of_this_code() {
-        let schemas = [
-            ("fuse", schemars::schema_for!(super::Report)),
-            ("compare", schemars::schema_for!(super::ComparisonReport)),
-        ];
-        for (command, schema) in schemas {
-            let schema = serde_json::to_string_pretty(&schema).expect("a schema is JSON");
-            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("schemas/{command}.schema.json"));
-            if std::env::var_os("TRACKFUSE_UPDATE_SCHEMAS").is_some() {
-                std::fs::write(&path, format!("{schema}\n")).expect("the tree can be written");
-            }
-            let stored = std::fs::read_to_string(&path).expect("a schema");
-            assert!(
-                stored.trim_end() == schema,
-                "{command} differs; TRACKFUSE_UPDATE_SCHEMAS=1 writes it anew"
-            );
-        }
+        assert_schema(&schemars::schema_for!(super::Report), "fuse");
+        assert_schema(&schemars::schema_for!(super::ComparisonReport), "compare");
     }
 }

@@ -174,8 +174,13 @@ impl Gathered {
         let used: Vec<&str> =
             names.iter().zip(self.clocks).filter(|(_, n)| *n > 0).map(|(name, _)| *name).collect();
         let quantile = |delays: &mut Vec<f64>, share| robust::quantile(delays, share).unwrap_or(0.0);
+        let third = self.delays_s.len() / 3;
+        let median = |delays: &[f64]| robust::median(&mut delays.to_vec()).unwrap_or(0.0);
+        let last_third = self.delays_s.len() - third;
+        let delay_growth_s = median(&self.delays_s[last_third..]) - median(&self.delays_s[..third]);
         let timing = Timing {
             clock: used.join("+"),
+            delay_growth_s,
             delay_s: quantile(&mut self.delays_s, 0.5),
             delay_spread_s: 0.5 * (quantile(&mut self.delays_s, 0.84) - quantile(&mut self.delays_s, 0.16)),
         };

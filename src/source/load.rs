@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::gathered::Gathered;
 use super::reading::Reader;
-use super::{SourceError, recognise};
+use super::{SourceError, is_datum_like};
 use crate::config::SourceConfig;
-use crate::log::Log;
+use crate::log::{Index, Log, Message};
 use crate::sample::Source;
 use crate::time::Time;
 
@@ -45,6 +45,8 @@ pub struct Timing {
     pub delay_s: f64,
     /// Half the width of its middle 68 %, s.
     pub delay_spread_s: f64,
+    /// How much its median grows from the first third of the messages to the last, s.
+    pub delay_growth_s: f64,
 }
 
 /// A source with what is to be said of it.
@@ -78,41 +80,12 @@ pub fn load(
     named: bool,
 ) -> Result<(Vec<Loaded>, Time, Vec<String>), SourceError> {
     let mut gathered = configs.iter().map(Gathered::new).collect::<Result<Vec<_>, _>>()?;
-    let index = log.index();
-    let mut readers: BTreeMap<u16, Vec<(usize, Reader)>> = BTreeMap::new();
+    let mut readers = Readers::default();
     for (i, source) in gathered.iter().enumerate() {
-        let topics: BTreeSet<&str> = source.paths.iter().map(|(_, p)| p.topic.as_str()).collect();
-        for topic in topics {
-            let mut channels = index.channels_of(topic).peekable();
-            if channels.peek().is_none() {
-                return Err(SourceError::NoTopic {
-                    name: source.config.name.clone(),
-                    topic: topic.to_owned(),
-                    topics: index
-                        .channels
-                        .values()
-                        .map(|c| c.topic.clone())
-                        .collect::<BTreeSet<_>>()
-                        .into_iter()
-                        .collect(),
-                });
-            }
-            for channel in channels {
-                let reader = Reader::new(&source.config, &source.paths, index, channel)?;
-                readers.entry(channel.id).or_default().push((i, reader));
-            }
-        }
+        readers.add(log.index(), i, source)?;
     }
-    let wanted: BTreeSet<u16> = readers.keys().copied().collect();
-    log.for_each_message(&wanted, |message| {
-        for (i, reader) in readers.get(&message.channel_id).into_iter().flatten() {
-            gathered[*i].messages += 1;
-            match reader.read(&message) {
-                Ok(Some(outcome)) => gathered[*i].add(outcome),
-                Ok(None) => gathered[*i].untimed += 1,
-                Err(error) => gathered[*i].undecodable.get_or_insert((0, error)).0 += 1,
-            }
-        }
+    log.for_each_message(&readers.channels(), |message| {
+        readers.read(&message, &mut gathered);
         Ok::<(), SourceError>(())
     })?;
     let (mut dropped, mut first_error) = (Vec::new(), None);
@@ -134,6 +107,54 @@ pub fn load(
     Ok((gathered.into_iter().map(|g| g.finish(origin)).collect(), origin, dropped))
 }
 
+/// Who reads the messages of which channel.
+#[derive(Debug, Default)]
+pub(super) struct Readers(BTreeMap<u16, Vec<(usize, Reader)>>);
+
+impl Readers {
+    /// Adds the readers of `source`, which is the `number`-th.
+    pub(super) fn add(&mut self, index: &Index, number: usize, source: &Gathered) -> Result<(), SourceError> {
+        let topics: BTreeSet<&str> = source.paths.iter().map(|(_, p)| p.topic.as_str()).collect();
+        let mut readers = Vec::new();
+        for topic in topics {
+            let mut channels = index.channels_of(topic).peekable();
+            if channels.peek().is_none() {
+                let topics: BTreeSet<String> = index.channels.values().map(|c| c.topic.clone()).collect();
+                return Err(SourceError::NoTopic {
+                    name: source.config.name.clone(),
+                    topic: topic.to_owned(),
+                    topics: topics.into_iter().collect(),
+                });
+            }
+            for channel in channels {
+                readers.push((channel.id, Reader::new(&source.config, &source.paths, index, channel)?));
+            }
+        }
+        for (channel, reader) in readers {
+            self.0.entry(channel).or_default().push((number, reader));
+        }
+        Ok(())
+    }
+
+    /// The channels that are read.
+    pub(super) fn channels(&self) -> BTreeSet<u16> {
+        self.0.keys().copied().collect()
+    }
+
+    /// Puts what a message says to those of the sources that it belongs to.
+    pub(super) fn read(&self, message: &Message<'_>, sources: &mut [Gathered]) {
+        for (i, reader) in self.0.get(&message.channel_id).into_iter().flatten() {
+            let Some(source) = sources.get_mut(*i) else { continue };
+            source.messages += 1;
+            match reader.read(message) {
+                Ok(Some(outcome)) => source.add(outcome),
+                Ok(None) => source.untimed += 1,
+                Err(error) => source.undecodable.get_or_insert((0, error)).0 += 1,
+            }
+        }
+    }
+}
+
 /// The datum among `configs`: the one marked, else the one that its name or topic says, else the first.
 #[must_use]
 pub fn datum(configs: &[SourceConfig]) -> usize {
@@ -141,7 +162,7 @@ pub fn datum(configs: &[SourceConfig]) -> usize {
         [Some(&c.name), c.position.as_ref(), c.velocity.as_ref()]
             .into_iter()
             .flatten()
-            .any(|text| recognise::is_datum_like(text))
+            .any(|text| is_datum_like(text))
     };
     configs.iter().position(|c| c.datum).or_else(|| configs.iter().position(says)).unwrap_or(0)
 }

@@ -1,22 +1,33 @@
 //! Which channels are which sensor, and their messages as samples.
 //!
-//! [`recognise`] makes the same source tables out of topic names that a config would hold; [`load`] reads
-//! them, recognised or configured, so that there is one way in.
+//! [`judge`] says of every channel whether it could be a source; [`recognise`] makes the same source tables out
+//! of the topics' names that a config would hold; [`load`] reads them, recognised or configured, so that there
+//! is one way in.
 
+mod candidate;
 mod gathered;
+mod glimpse;
 mod load;
+mod propose;
 mod reading;
 mod recognise;
 mod recorded;
+mod topic;
 
+pub use candidate::{Candidate, Judged, Judgement, Unfit, judge};
+pub use glimpse::{Glimpse, glimpse};
 pub use load::{Loaded, SigmaOrigin, Timing, datum, load};
-pub use recognise::{Candidate, Choice, Recognised, is_datum_like, recognise};
+pub use propose::{Proposal, propose};
+pub use recognise::{Choice, Recognised, choices_of, recognise};
 pub use recorded::{Recorded, recorded, reference};
+pub use topic::is_datum_like;
+
+use std::path::Path;
 
 use crate::config::TimeChoice;
 use crate::log::LogError;
 use crate::log::decode::{DecodeError, PathError, PathMiss};
-use crate::printable::printable;
+use crate::printable::{printable, shell_word};
 use crate::time::Time;
 
 /// Why there are no samples.
@@ -31,22 +42,18 @@ pub enum SourceError {
         if candidates.is_empty() { listed_unusable(unusable) } else { String::new() }
     )]
     Unrecognised {
+        /// The log.
+        log: String,
         /// Channels that could be sources.
         candidates: Vec<Candidate>,
         /// All other topics, and why they can't be.
         unusable: Vec<(String, String)>,
-        /// The candidates as a config would name them.
-        choices: Vec<Choice>,
     },
     /// Several channels would do for one source, or several sources for the datum.
-    #[error("{what}{}", listed("; these would fit: ", candidates))]
+    #[error("{}{}", ambiguity.what, listed("; these would fit: ", &ambiguity.candidates))]
     Ambiguous {
-        /// What can't be decided.
-        what: String,
-        /// Channels that could be meant.
-        candidates: Vec<Candidate>,
-        /// All recognised sources as a config would name them.
-        choices: Vec<Choice>,
+        /// Between what.
+        ambiguity: Box<Ambiguity>,
     },
     /// A velocity in the body frame, with nothing to turn it by.
     #[error(
@@ -156,19 +163,29 @@ pub enum SourceError {
     },
 }
 
+/// Sensors of which it is not clear what to take.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Ambiguity {
+    /// The log.
+    pub log: String,
+    /// What can't be decided.
+    pub what: String,
+    /// Channels that could be meant.
+    pub candidates: Vec<Candidate>,
+    /// Other channels that would fit.
+    pub unused: Vec<Candidate>,
+    /// All recognised sources as a config would name them.
+    pub choices: Vec<Choice>,
+}
+
 impl SourceError {
     /// What to do about it.
     #[must_use]
     pub fn hint(&self) -> Option<String> {
         let hint = match self {
             Self::Log(error) => return error.hint(),
-            Self::Unrecognised { choices, .. } | Self::Ambiguous { choices, .. } if !choices.is_empty() => {
-                format!(
-                    "choose the sources in a config, and pass it with `--config`; of these, keep what sees the vehicle, \
-                 and `datum` where it is trusted most:\n\n{}",
-                    recognise::config_of(choices)
-                )
-            }
+            Self::Unrecognised { log, candidates, .. } if !candidates.is_empty() => choose_hint(log),
+            Self::Ambiguous { ambiguity } => choose_hint(&ambiguity.log),
             Self::NoTopic { topic, topics, .. } => {
                 let near = topics.iter().map(|t| (strsim::jaro_winkler(topic, t), t));
                 let (score, nearest) = near.max_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -204,6 +221,19 @@ impl SourceError {
             _ => true,
         }
     }
+}
+
+fn choose_hint(log: &str) -> String {
+    let init = init_line(Path::new(log));
+    format!("`{init}` writes a config that lists them: choose there, and pass it with `--config`")
+}
+
+/// The command that writes a config for a log, beside it.
+#[must_use]
+pub fn init_line(log: &Path) -> String {
+    let [log, config] =
+        [log.to_owned(), log.with_extension("toml")].map(|p| shell_word(&p.to_string_lossy()));
+    format!("trackfuse init {log} -o {config}")
 }
 
 fn listed(what: &str, candidates: &[Candidate]) -> String {

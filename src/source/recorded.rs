@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use super::SourceError;
+use super::candidate::of_topic;
 use super::load::{Loaded, load};
-use super::recognise::paths_of_topic;
 use crate::config::{SourceConfig, TimeChoice};
 use crate::estimate::coverage::{self, OUTAGE_INTERVALS, interpolate};
 use crate::log::decode::{MessagePath, Step};
@@ -73,7 +73,10 @@ pub fn reference(
             MessagePath::parse(text).map_err(|error| SourceError::Path { name: name.clone(), error })?
         };
         let (position, velocity) = match path.steps.last() {
-            None => paths_of_topic(log, &path.topic)?,
+            None => {
+                let found = of_topic(log, &path.topic)?;
+                (found.position, found.velocity)
+            }
             Some(Step::Field(field)) if is_velocity(field) => (None, Some(text.clone())),
             Some(_) => (Some(text.clone()), None),
         };

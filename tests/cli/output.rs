@@ -134,13 +134,16 @@ fn output_prefix_names_topics_and_metadata() {
 }
 
 /// Fails unless `value` is as `schema` says: types, required keys, no key that it doesn't name.
-fn validate(value: &Value, schema: &Value, root: &Value, at: &str) {
+pub(crate) fn validate(value: &Value, schema: &Value, root: &Value, at: &str) {
     if let Some(reference) = schema["$ref"].as_str() {
         return validate(value, &root["$defs"][reference.trim_start_matches("#/$defs/")], root, at);
     }
     if let Some(options) = schema["anyOf"].as_array() {
         let option = options.iter().find(|o| (o["type"] == "null") == value.is_null());
         return validate(value, option.unwrap_or_else(|| panic!("{at}: {value}")), root, at);
+    }
+    if let Some(words) = schema["oneOf"].as_array() {
+        return assert!(words.iter().any(|word| word["const"] == *value), "{at}: {value}");
     }
     let kind = match value {
         Value::Null => "null",

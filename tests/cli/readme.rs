@@ -5,22 +5,20 @@ use std::path::Path;
 
 use super::trial::trackfuse;
 
-/// What stands in the first block of that language.
-fn block<'t>(text: &'t str, language: &str) -> &'t str {
-    let start = format!("\n```{language}\n");
-    let from = text.find(&start).expect("a block") + start.len();
-    let len = text[from..].find("```\n").expect("its end");
-    &text[from..][..len]
+/// The commands that run in a clone, each with the output that follows it.
+fn examples(readme: &str) -> Vec<(&str, &str)> {
+    let commands = readme.split("\n```sh\ncargo run --release -- ").skip(1);
+    let examples = commands.filter_map(|rest| {
+        let (command, rest) = rest.split_once("\n```\n")?;
+        Some((command, rest.split_once("```text\n")?.1.split_once("```\n")?.0))
+    });
+    examples.collect()
 }
 
 #[test]
-fn readme_command_prints_what_the_readme_shows_and_again_when_run_again() {
+fn readme_commands_print_what_the_readme_shows_and_again_when_run_again() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let readme = fs::read_to_string(root.join("README.md")).unwrap();
-    let command = block(&readme, "sh").trim();
-    let args = command.strip_prefix("cargo run --release -- ").expect("the program's arguments");
-    let args: Vec<&str> = args.split(' ').collect();
-
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("sample_logs")).unwrap();
     for entry in fs::read_dir(root.join("sample_logs")).unwrap() {
@@ -29,19 +27,31 @@ fn readme_command_prints_what_the_readme_shows_and_again_when_run_again() {
             fs::copy(entry.path(), folder.path().join("sample_logs").join(entry.file_name())).unwrap();
         }
     }
-    let first = trackfuse(folder.path(), &args);
-    let output = folder.path().join("sample_logs/steep_climb.fused.mcap");
-    let bytes = fs::read(&output).unwrap();
-    let second = trackfuse(folder.path(), &args);
-    assert_eq!((first.code, second.code), (3, 3), "{first:#?}");
-    assert_eq!(first.stdout, second.stdout);
-    assert!(bytes == fs::read(&output).unwrap(), "the output differs from run to run");
-
-    if std::env::var_os("TRACKFUSE_UPDATE_README").is_some() {
-        let updated = readme.replacen(block(&readme, "text"), &first.stdout, 1);
-        fs::write(root.join("README.md"), updated).unwrap();
-        return;
+    let output = || fs::read(folder.path().join("sample_logs/steep_climb.fused.mcap")).unwrap();
+    let mut updated = readme.clone();
+    let examples = examples(&readme);
+    assert!(examples.len() > 1);
+    for (command, shown) in examples {
+        let args: Vec<&str> = command.split(' ').collect();
+        let first = trackfuse(folder.path(), &args);
+        let bytes = output();
+        let second = trackfuse(folder.path(), &args);
+        assert_eq!(first.code, if command.starts_with("fuse") { 3 } else { 0 }, "{first:#?}");
+        assert_eq!((first.code, &first.stdout), (second.code, &second.stdout));
+        assert!(bytes == output(), "the output differs from run to run");
+        if std::env::var_os("TRACKFUSE_UPDATE_README").is_some() {
+            let (before, rest) = updated.split_once(command).unwrap();
+            let between = rest.split_once("```text\n").unwrap().0;
+            let behind = &rest[between.len() + "```text\n".len() + shown.len()..];
+            updated = format!("{before}{command}{between}```text\n{}{behind}", first.stdout);
+        } else {
+            assert_eq!(
+                first.stdout, shown,
+                "the README's output differs; hint: TRACKFUSE_UPDATE_README=1 writes it anew"
+            );
+        }
     }
-    let hint = "TRACKFUSE_UPDATE_README=1 writes it anew";
-    assert_eq!(first.stdout, block(&readme, "text"), "the README's output differs; hint: {hint}");
+    if updated != readme {
+        fs::write(root.join("README.md"), updated).unwrap();
+    }
 }

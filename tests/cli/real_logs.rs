@@ -1,26 +1,10 @@
 //! Recordings of others, which `TRACKFUSE_TEST_DATA` leads to.
 
 use std::fs;
-use std::path::PathBuf;
 
 use serde_json::json;
 
-use super::trial::{Trial, assert_says};
-
-fn logs(folder: &str) -> Vec<PathBuf> {
-    let Some(data) = std::env::var_os("TRACKFUSE_TEST_DATA") else {
-        // past the test runner, which would keep it to itself
-        let _ =
-            std::io::Write::write_all(&mut std::io::stderr(), b"skipped: TRACKFUSE_TEST_DATA is not set\n");
-        return Vec::new();
-    };
-    let entries = fs::read_dir(PathBuf::from(data).join(folder)).unwrap();
-    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
-    paths.retain(|path| path.extension().is_some_and(|e| e == "mcap"));
-    paths.sort();
-    assert!(!paths.is_empty());
-    paths
-}
+use super::trial::{Trial, assert_says, logs};
 
 #[test]
 fn real_logs_without_clear_sources_end_with_an_error_that_names_their_topics() {

@@ -63,35 +63,6 @@ fn sources_are_never_what_a_topic_calls_truth_reference_ins_or_gt() {
     assert_eq!(report["unused_topics"], json!(["/usv/pose"]));
 }
 
-/// The config that a hint shows.
-fn snippet(stderr: &str) -> String {
-    let start = stderr.find("[[source]]").unwrap_or_else(|| panic!("no snippet in:\n{stderr}"));
-    stderr[start..].to_owned()
-}
-
-#[test]
-fn sources_that_are_not_clear_are_listed_and_the_hint_works_when_pasted() {
-    let logs: [&[&str]; 4] = [
-        // no sensor's word anywhere
-        &["/rov/pose", "/rov/odom", "/ship/pose"],
-        // one sensor, two positions
-        &["/beacon/fix", "/beacon/pose"],
-        // no datum
-        &["/usbl/pose", "/lbl/pose"],
-        // names that need care
-        &["/\"quoted\" \u{7}/pose", "/ünï.cødé/pose", "/", ""],
-    ];
-    for topics in logs {
-        let mut log = TrialLog::new();
-        topics.iter().for_each(|topic| log.sensor(topic, &Sensor::new(0.0, 8.0, 1)));
-        let log = log.finish();
-        let error = Trial::of(&log).error(2);
-        assert_says(&error, &["these would fit: ", "\nhint: ", "--config"]);
-        let ran = Trial::of(&log).config(&snippet(&error)).fuse(&[]);
-        assert_eq!(ran.code, 0, "{error}\n{ran:#?}");
-    }
-}
-
 #[test]
 fn sources_that_nothing_offers_are_an_error_that_says_what_there_is() {
     let mut log = TrialLog::new();

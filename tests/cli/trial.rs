@@ -182,3 +182,19 @@ pub(crate) fn assert_says(text: &str, parts: &[&str]) {
         assert!(text.contains(part), "{part:?} is missing in:\n{text}");
     }
 }
+
+/// The recordings in a folder of those that `TRACKFUSE_TEST_DATA` leads to.
+pub(crate) fn logs(folder: &str) -> Vec<PathBuf> {
+    let Some(data) = std::env::var_os("TRACKFUSE_TEST_DATA") else {
+        // past the test runner, which would keep it to itself
+        let _ =
+            std::io::Write::write_all(&mut std::io::stderr(), b"skipped: TRACKFUSE_TEST_DATA is not set\n");
+        return Vec::new();
+    };
+    let entries = fs::read_dir(PathBuf::from(data).join(folder)).unwrap();
+    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+    paths.retain(|path| path.extension().is_some_and(|e| e == "mcap"));
+    paths.sort();
+    assert!(!paths.is_empty());
+    paths
+}

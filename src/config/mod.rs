@@ -3,6 +3,11 @@
 //! Sigmas, times and lengths carry their unit in the key. The resolved values go into the output's
 //! metadata, so that a track can be made again.
 
+mod check;
+mod template;
+
+pub use template::{SourceTable, template};
+
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
@@ -62,13 +67,13 @@ impl ConfigError {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
-    /// The output.
+    /// The new topics and their chunks.
     pub output: Output,
     /// The sources; without any, they are recognised by their topics' names.
     pub source: Vec<SourceConfig>,
     /// How they are fused.
     pub fusion: Fusion,
-    /// How the track is carried on.
+    /// How the track is carried on behind the last sample.
     pub extrapolation: Extrapolation,
     /// Heights whose first upward crossing is reported.
     pub characteristic_point: Vec<CharacteristicPoint>,
@@ -82,18 +87,22 @@ pub struct Output {
     pub prefix: String,
     /// Points of the track a second; default: the fastest source's rate.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = 50.0)]
     pub rate_hz: Option<f64>,
     /// Frame of the track; default: the datum's.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = &"enu")]
     pub frame_id: Option<String>,
     /// Compression of the new chunks.
     pub compression: Compression,
     /// T0, from which times count, ns; default: the datum's first sample.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = 1_731_000_000_000_000_000_i64)]
     pub t0_ns: Option<i64>,
     /// Whether z = 0 is the sea surface, so that points carry a depth; default: when every observed position
     /// lies below z = 2 m and some below -2 m.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = true)]
     pub surface_at_zero: Option<bool>,
 }
 
@@ -115,25 +124,31 @@ impl Default for Output {
 #[serde(deny_unknown_fields, default)]
 pub struct SourceConfig {
     /// What to call it.
+    #[schemars(example = &"tether")]
     pub name: String,
     /// Message path of its position, m: an object with x, y, z or an array of three.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = &"/tether/track.position")]
     pub position: Option<String>,
     /// Message path of its velocity, m/s.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = &"/tether/track.velocity")]
     pub velocity: Option<String>,
     /// Whether its bias and clock are zero by definition; default: the tether's are, else the first source's.
     pub datum: bool,
-    /// Its axes.
+    /// Directions of its x, y and z.
     pub axes: Axes,
     /// Standard deviation of its position, m; default: from the messages, else estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = 0.2)]
     pub position_sigma_m: Option<f64>,
     /// Standard deviation of its velocity, m/s; default: from the messages, else estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = 0.2)]
     pub velocity_sigma_m_s: Option<f64>,
     /// What counts as a sample's time; default: its stamp, else the publish time, else the log time.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = &"log")]
     pub time: Option<TimeChoice>,
     /// How long before its time a sample was taken, s.
     pub latency_s: f64,
@@ -141,6 +156,7 @@ pub struct SourceConfig {
     pub offset_m: [f64; 3],
     /// Frame of its velocities; default: `body` for `nav_msgs/Odometry`, else `world`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = &"world")]
     pub velocity_frame: Option<VelocityFrame>,
 }
 
@@ -189,6 +205,7 @@ pub struct Fusion {
     pub estimate: Registration,
     /// SFF: knot spacing, s; default: the fastest source's median interval, but at least 0.08 s.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = 0.1)]
     pub knot_spacing_s: Option<f64>,
     /// PCF: order of the polynomial; 12 is the paper's best.
     pub order: usize,
@@ -234,7 +251,7 @@ pub enum Auto {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Extrapolation {
-    /// The method.
+    /// The method; `pcf`, a constrained polynomial, is the only one yet.
     pub method: ExtrapolationMethod,
     /// How far, s; 0 for none.
     pub horizon_s: f64,
@@ -243,11 +260,13 @@ pub struct Extrapolation {
     /// Length of the stretch that it is fitted to, s; default: 1.4 (drag: 0.9), or 12 median intervals of the slowest
     /// source.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = 1.4)]
     pub window_s: Option<f64>,
     /// Whether the polynomial's acceleration dies away; without, it is the paper's plain least squares.
     pub prior: bool,
-    /// Height at which it stops, m: the surface, say.
+    /// Height at which it stops, m: the surface, say; default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = 0.0)]
     pub stop_z_m: Option<f64>,
 }
 
@@ -282,8 +301,10 @@ pub enum ExtrapolationMethod {
 #[serde(deny_unknown_fields)]
 pub struct CharacteristicPoint {
     /// What to call it.
+    #[schemars(example = &"exit")]
     pub name: String,
     /// The height, m, Z up.
+    #[schemars(example = -2.0)]
     pub z_m: f64,
 }
 
@@ -312,89 +333,6 @@ impl Config {
         })?;
         config.check()?;
         Ok(config)
-    }
-
-    /// Checks every value's range.
-    ///
-    /// # Errors
-    /// [`ConfigError::Range`] for the first that is out of it.
-    pub fn check(&self) -> Result<(), ConfigError> {
-        let range = |ok: bool, key: String, value: String, expected| {
-            if ok { Ok(()) } else { Err(ConfigError::Range { key, value, expected }) }
-        };
-        let positive = |key: &str, value: Option<f64>| {
-            let ok = value.is_none_or(|v| v > 0.0 && v.is_finite());
-            range(ok, key.into(), format!("{:?}", value.unwrap_or_default()), "a positive number")
-        };
-        let (output, fusion, beyond) = (&self.output, &self.fusion, &self.extrapolation);
-        let plain = |c: char| c.is_alphanumeric() || "/_-.".contains(c);
-        let prefix_ok = output.prefix.starts_with('/')
-            && !output.prefix.ends_with('/')
-            && output.prefix.chars().all(plain);
-        range(prefix_ok, "output.prefix".into(), format!("{:?}", output.prefix), "\"/name\"")?;
-        positive("output.rate_hz", output.rate_hz)?;
-        range(
-            output.rate_hz.is_none_or(|r| (0.001..=10_000.0).contains(&r)),
-            "output.rate_hz".into(),
-            format!("{:?}", output.rate_hz.unwrap_or_default()),
-            "0.001 to 10000 Hz",
-        )?;
-        positive("fusion.knot_spacing_s", fusion.knot_spacing_s)?;
-        positive("fusion.bridge_max_s", Some(fusion.bridge_max_s))?;
-        let orders = 1..=crate::estimate::polynomial::MAX_ORDER;
-        range(orders.contains(&fusion.order), "fusion.order".into(), fusion.order.to_string(), "1 to 48")?;
-        range(
-            orders.contains(&beyond.order),
-            "extrapolation.order".into(),
-            beyond.order.to_string(),
-            "1 to 48",
-        )?;
-        range(
-            (1..=100_000).contains(&fusion.window_points),
-            "fusion.window_points".into(),
-            fusion.window_points.to_string(),
-            "1 to 100000",
-        )?;
-        let list = match &fusion.estimate {
-            Registration::List(list) => list.join(", "),
-            Registration::Auto(_) => String::new(),
-        };
-        range(list.is_empty(), "fusion.estimate".into(), format!("[{list}]"), "\"auto\" or []")?;
-        let horizon_ok = (0.0..=3600.0).contains(&beyond.horizon_s);
-        range(horizon_ok, "extrapolation.horizon_s".into(), beyond.horizon_s.to_string(), "0 to 3600 s")?;
-        positive("extrapolation.window_s", beyond.window_s)?;
-        range(
-            beyond.stop_z_m.is_none_or(f64::is_finite),
-            "extrapolation.stop_z_m".into(),
-            format!("{:?}", beyond.stop_z_m.unwrap_or_default()),
-            "a finite number",
-        )?;
-        for point in &self.characteristic_point {
-            let key = format!("characteristic_point {:?}: z_m", point.name);
-            range(point.z_m.is_finite(), key, point.z_m.to_string(), "a finite number")?;
-        }
-        range(
-            self.source.len() <= 32,
-            "source".into(),
-            format!("a list of {}", self.source.len()),
-            "at most 32 sources",
-        )?;
-        let datums = self.source.iter().filter(|s| s.datum).count();
-        range(datums <= 1, "source.datum".into(), format!("true for {datums} sources"), "one datum at most")?;
-        for (i, source) in self.source.iter().enumerate() {
-            let key = |k: &str| format!("source {:?}: {k}", source.name);
-            let unique = !source.name.is_empty() && self.source[..i].iter().all(|s| s.name != source.name);
-            range(unique, key("name"), format!("{:?}", source.name), "a name of its own")?;
-            let measures = source.position.is_some() || source.velocity.is_some();
-            range(measures, key("position"), "missing".into(), "a position or a velocity path")?;
-            positive(&key("position_sigma_m"), source.position_sigma_m)?;
-            positive(&key("velocity_sigma_m_s"), source.velocity_sigma_m_s)?;
-            let latency_ok = source.latency_s.abs() <= 3600.0;
-            range(latency_ok, key("latency_s"), source.latency_s.to_string(), "-3600 to 3600 s")?;
-            let offset_ok = source.offset_m.iter().all(|v| v.is_finite());
-            range(offset_ok, key("offset_m"), format!("{:?}", source.offset_m), "three finite numbers")?;
-        }
-        Ok(())
     }
 }
 
@@ -444,31 +382,6 @@ mod tests {
         assert!(error.to_string().contains("trial.toml: line 2: unknown field `rate`"), "{error}");
         let error = parse("[fusion]\nmethod = \"spf\"\n").expect_err("no such method");
         assert_eq!(error.hint().as_deref(), Some("did you mean `sff`?"));
-    }
-
-    #[test]
-    fn values_out_of_range_are_named_with_what_was_expected() {
-        for (text, part) in [
-            ("[output]\nprefix = \"fused\"", "output.prefix is \"fused\", expected \"/name\""),
-            ("[output]\nrate_hz = 0.0", "output.rate_hz is 0.0, expected a positive number"),
-            ("[output]\nrate_hz = nan", "output.rate_hz is NaN"),
-            ("[fusion]\norder = 49", "fusion.order is 49, expected 1 to 48"),
-            ("[extrapolation]\nhorizon_s = -1.0", "extrapolation.horizon_s is -1"),
-            ("[[source]]\nname = \"a\"", "source \"a\": position is missing"),
-            (
-                "[[source]]\nname = \"a\"\nposition = \"/a.p\"\n[[source]]\nname = \"a\"\nposition = \"/b.p\"",
-                "a name of its own",
-            ),
-            (
-                "[[source]]\nname = \"a\"\nposition = \"/a.p\"\nposition_sigma_m = -1.0",
-                "position_sigma_m is -1.0",
-            ),
-            ("[[characteristic_point]]\nname = \"exit\"\nz_m = inf", "z_m is inf"),
-            ("[fusion]\nestimate = [\"bias\"]", "fusion.estimate is [bias], expected \"auto\" or []"),
-        ] {
-            let error = parse(text).expect_err(text).to_string();
-            assert!(error.contains(part), "{text}: {error}");
-        }
     }
 
     #[test]

@@ -1,0 +1,229 @@
+//! Channel by channel: whether it could be a source, with the paths into its messages, or why it can't.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+
+use super::SourceError;
+use super::topic::{is_reference, sensor_word, vector_is};
+use crate::log::decode::{Decoder, MessagePath, Value};
+use crate::log::{Index, Log, LogError};
+use crate::printable::printable;
+use crate::sample::Quantity;
+
+/// Schemas of an earlier run's results, known even where its metadata record is lost.
+const OWN_SCHEMAS: [&str; 3] =
+    ["trackfuse.TrackPoint", "trackfuse.CharacteristicPoint", "trackfuse.Residual"];
+
+/// Where the usual messages keep a position, the most specific first.
+const POSITION_FIELDS: [&str; 5] = ["pose.pose.position", "pose.position", "position", "point", "vector"];
+
+/// Where they keep a velocity.
+const VELOCITY_FIELDS: [&str; 4] = ["twist.twist.linear", "twist.linear", "velocity", "vector"];
+
+/// A channel that could be a source, or a part of one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Candidate {
+    /// Its topic.
+    pub topic: String,
+    /// Message path of its position.
+    pub position: Option<String>,
+    /// Message path of its velocity.
+    pub velocity: Option<String>,
+}
+
+impl fmt::Display for Candidate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let what = match (&self.position, &self.velocity) {
+            (Some(_), Some(_)) => "position and velocity",
+            (Some(_), None) => "position",
+            _ => "velocity",
+        };
+        write!(f, "{} ({what})", printable(&self.topic))
+    }
+}
+
+/// Why a channel can't be a source.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Unfit {
+    /// This program made it.
+    #[error("written by trackfuse")]
+    Own,
+    /// It is there to judge a track by.
+    #[error("by its name a reference, which a track is judged by")]
+    Reference,
+    /// Its messages can't be decoded.
+    #[error("{0}")]
+    Undecodable(String),
+    /// It has no messages.
+    #[error("no messages")]
+    Silent,
+    /// Its messages hold no vector where one is looked for; the names of their first fields.
+    #[error("no position or velocity in {0}")]
+    NoVector(String),
+}
+
+/// A channel and what it is fit for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Judged {
+    /// The channel's id.
+    pub id: u16,
+    /// Its topic.
+    pub topic: String,
+    /// Where it could be a source, how; else why not.
+    pub verdict: Result<Candidate, Unfit>,
+}
+
+/// All channels of a log, by id.
+#[derive(Debug)]
+pub struct Judgement {
+    /// Where the log is.
+    pub(super) log: String,
+    /// The channels.
+    pub channels: Vec<Judged>,
+    /// Parts of the log that could not be read.
+    pub damaged: Vec<LogError>,
+}
+
+/// Judges every channel of a log by its name and its first message.
+///
+/// Channels whose topics begin with `prefix`, and those that this program wrote, can't be sources.
+#[must_use]
+pub fn judge(log: &Log, prefix: &str) -> Judgement {
+    let index = log.index();
+    let (mut decoders, mut verdicts) = (BTreeMap::new(), BTreeMap::new());
+    let silent = silent(index);
+    for channel in index.channels.values() {
+        let schema = index.schema_of(channel);
+        let (encoding, name, data) =
+            schema.map_or(("", "", &[][..]), |s| (s.encoding.as_str(), s.name.as_str(), s.data.as_slice()));
+        let unfit = if is_own(index, &channel.topic, prefix) || OWN_SCHEMAS.contains(&name) {
+            Unfit::Own
+        } else if is_reference(&channel.topic) {
+            Unfit::Reference
+        } else if silent.contains(&channel.id) {
+            Unfit::Silent
+        } else {
+            match Decoder::new(&channel.message_encoding, encoding, name, data) {
+                Ok(decoder) => {
+                    decoders.insert(channel.id, decoder);
+                    continue;
+                }
+                Err(error) => Unfit::Undecodable(error.to_string()),
+            }
+        };
+        verdicts.insert(channel.id, Err(unfit));
+    }
+    let (first, damaged) = log.first_messages(&decoders.keys().copied().collect::<BTreeSet<_>>());
+    for (id, decoder) in decoders {
+        let verdict = match first.get(&id).map(|message| decoder.decode(&message.data)) {
+            None => Err(Unfit::Silent),
+            Some(Err(error)) => Err(Unfit::Undecodable(error.to_string())),
+            Some(Ok(value)) => fit(&index.channels[&id].topic, &value),
+        };
+        verdicts.insert(id, verdict);
+    }
+    let channels = verdicts
+        .into_iter()
+        .map(|(id, verdict)| Judged { id, topic: index.channels[&id].topic.clone(), verdict })
+        .collect();
+    Judgement { log: log.path().display().to_string(), channels, damaged }
+}
+
+/// Whether a topic is below `prefix`, or below that of an earlier run, which its metadata record names.
+fn is_own(index: &Index, topic: &str, prefix: &str) -> bool {
+    let below = |prefix: &str| topic.strip_prefix(prefix).is_some_and(|rest| rest.starts_with('/'));
+    below(prefix) || index.metadata.iter().filter_map(|m| m.name.strip_prefix("trackfuse:")).any(below)
+}
+
+/// What a topic of the log holds by its first message, whatever its name.
+///
+/// # Errors
+/// [`SourceError::NoTopic`]; [`SourceError::Empty`]; [`SourceError::Decode`]; [`SourceError::NoVectors`] where it
+/// holds neither a position nor a velocity.
+pub(super) fn of_topic(log: &Log, topic: &str) -> Result<Candidate, SourceError> {
+    let (index, name) = (log.index(), topic.to_owned());
+    let topic = name.clone();
+    let Some(channel) = index.channels_of(&topic).next() else {
+        let topics: BTreeSet<String> = index.channels.values().map(|c| c.topic.clone()).collect();
+        return Err(SourceError::NoTopic { name, topic, topics: topics.into_iter().collect() });
+    };
+    let schema = index.schema_of(channel);
+    let (encoding, schema_name, data) =
+        schema.map_or(("", "", &[][..]), |s| (s.encoding.as_str(), s.name.as_str(), s.data.as_slice()));
+    let (first, damaged) = log.first_messages(&[channel.id].into());
+    let Some(message) = first.get(&channel.id) else {
+        return Err(damaged.into_iter().next().map_or(SourceError::Empty { name, topic }, SourceError::Log));
+    };
+    let decoded = Decoder::new(&channel.message_encoding, encoding, schema_name, data)
+        .and_then(|decoder| decoder.decode(&message.data));
+    let value = decoded.map_err(|error| SourceError::Decode { name, topic: topic.clone(), error })?;
+    let nothing = |_| SourceError::NoVectors {
+        topic: topic.clone(),
+        what: "position or velocity",
+        found: fields_of(&value),
+    };
+    fit(&topic, &value).map_err(nothing)
+}
+
+/// Channels that have no messages, as far as the statistics tell: looking for one would read the whole log.
+fn silent(index: &Index) -> BTreeSet<u16> {
+    let Some(statistics) = &index.statistics else { return BTreeSet::new() };
+    let counts = &statistics.channel_message_counts;
+    let sum = counts.values().try_fold(0_u64, |sum, count| sum.checked_add(*count));
+    if sum != Some(statistics.message_count) {
+        return BTreeSet::new();
+    }
+    let none = |id: &u16| counts.get(id).is_none_or(|count| *count == 0);
+    index.channels.keys().copied().filter(none).collect()
+}
+
+/// The vectors of a topic's first message.
+fn fit(topic: &str, message: &Value) -> Result<Candidate, Unfit> {
+    let path_of = |quantity: Quantity| {
+        let fields: &[&str] = match quantity {
+            Quantity::Position => &POSITION_FIELDS,
+            Quantity::Velocity => &VELOCITY_FIELDS,
+        };
+        let named = |f: &str| f != "vector" || vector_is(topic, quantity);
+        let fits = |f: &&&str| vector_at(message, f) && named(f);
+        // a sensor may begin before it has anything to say
+        let may_fit = |f: &&&str| sensor_word(topic).is_some() && absent_at(message, f) && named(f);
+        let found = fields.iter().find(fits).or_else(|| fields.iter().find(may_fit));
+        found.map(|f| format!("{}.{f}", quoted(topic)))
+    };
+    let (position, velocity) = (path_of(Quantity::Position), path_of(Quantity::Velocity));
+    if position.is_some() || velocity.is_some() {
+        Ok(Candidate { topic: topic.to_owned(), position, velocity })
+    } else {
+        Err(Unfit::NoVector(fields_of(message)))
+    }
+}
+
+/// What a message is, with the names of its first fields.
+fn fields_of(value: &Value) -> String {
+    const SHOWN: usize = 8;
+    let Value::Object(fields) = value else { return value.kind().to_owned() };
+    let mut names: Vec<&str> = fields.iter().take(SHOWN).map(|(name, _)| &**name).collect();
+    if fields.len() > SHOWN {
+        names.push("...");
+    }
+    names.join(", ")
+}
+
+fn vector_at(value: &Value, fields: &str) -> bool {
+    let leaf = fields.split('.').try_fold(value, |v, name| v.field(name));
+    leaf.and_then(Value::as_vector3).is_some()
+}
+
+/// Whether there is a place for a vector, but no value in it.
+fn absent_at(value: &Value, fields: &str) -> bool {
+    let leaf = fields.split('.').try_fold(value, |v, name| v.field(name));
+    let axis =
+        |v: &Value, name: &str| v.field(name).is_some_and(|c| *c == Value::Null || c.as_f64().is_some());
+    leaf.is_some_and(|v| *v == Value::Null || ["x", "y", "z"].iter().all(|name| axis(v, name)))
+}
+
+/// The topic as a path begins with it.
+fn quoted(topic: &str) -> String {
+    MessagePath { topic: topic.to_owned(), steps: Vec::new() }.to_string()
+}

@@ -1,0 +1,155 @@
+//! A log's sources as a config proposes them to a person.
+
+use std::collections::BTreeSet;
+
+use super::{
+    Ambiguity, Candidate, Recognised, SourceError, choices_of, datum, glimpse, is_datum_like, load, recognise,
+};
+use crate::config::{SourceConfig, SourceTable};
+use crate::log::Log;
+use crate::printable::printable;
+
+/// Above a source that a person must choose.
+const CHOOSE: &str = "To be chosen by a person: take the # away from the keys of what sees the vehicle.";
+
+/// What a config says of a log's sources.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Proposal {
+    /// The tables: sources, then what could be sources, as comments.
+    pub tables: Vec<SourceTable>,
+    /// What a person must decide before the config names a source.
+    pub undecided: Option<String>,
+    /// What a person must read.
+    pub warnings: Vec<String>,
+}
+
+/// How much of the log is looked at to see whether the sources hold what they seem to hold.
+const BUDGET_BYTES: u64 = 64 << 20;
+
+/// The sources that `fuse` takes without a config, as tables that make it take the same.
+///
+/// # Errors
+/// [`SourceError`] where the log can't be read.
+pub fn propose(log: &Log, prefix: &str) -> Result<Proposal, SourceError> {
+    let recognised = match recognise(log, prefix) {
+        Ok(recognised) => recognised,
+        Err(SourceError::Unrecognised { candidates, .. }) => {
+            let what = if candidates.is_empty() {
+                "no channel holds a position or velocity that can be read"
+            } else {
+                "no topic's name says that it is a sensor's"
+            };
+            return Ok(Proposal::to_choose(what.into(), &candidates));
+        }
+        Err(SourceError::Ambiguous { ambiguity }) => {
+            let Ambiguity { what, choices, unused, .. } = *ambiguity;
+            let likely = choices.iter().position(|c| is_datum_like(&c.name)).unwrap_or(0);
+            let mut proposal = Proposal::to_choose(what, &unused);
+            let tables = choices.into_iter().enumerate().map(|(i, choice)| SourceTable {
+                name: choice.name,
+                positions: choice.positions,
+                velocities: choice.velocities,
+                datum: i == likely,
+                commented: true,
+                remarks: Vec::new(),
+            });
+            let mut tables: Vec<SourceTable> = tables.collect();
+            tables.append(&mut proposal.tables);
+            proposal.tables = tables;
+            remark(&mut proposal.tables, CHOOSE);
+            return Ok(proposal);
+        }
+        Err(other) => return Err(other),
+    };
+    match kept(log, &recognised.sources) {
+        Ok((sources, left_out)) => Ok(Proposal::of(&recognised, &sources, left_out)),
+        Err(error @ SourceError::Log(_)) => Err(error),
+        // What stands against one of the sources stands against `fuse` without a config too.
+        Err(error) => {
+            let mut proposal = Proposal::of(&recognised, &recognised.sources, Vec::new());
+            proposal.tables.iter_mut().for_each(|table| table.commented = true);
+            proposal.undecided = Some(error.to_string());
+            Ok(proposal)
+        }
+    }
+}
+
+/// The sources less what `fuse` leaves out of them, with a sentence on each. Reads all their messages only where
+/// a look at some does not show that they hold everything.
+fn kept(log: &Log, sources: &[SourceConfig]) -> Result<(Vec<SourceConfig>, Vec<String>), SourceError> {
+    let (glimpses, excerpt) = glimpse(log, sources, BUDGET_BYTES);
+    if excerpt.damaged.is_empty() && glimpses.iter().all(|g| g.lacks.is_empty()) {
+        return Ok((sources.to_vec(), Vec::new()));
+    }
+    let (loaded, _, left_out) = load(log, sources, false)?;
+    let mut kept: Vec<SourceConfig> = loaded.into_iter().map(|l| l.config).collect();
+    let datum = datum(&kept);
+    if let Some(source) = kept.get_mut(datum) {
+        source.datum = true;
+    }
+    Ok((kept, left_out))
+}
+
+impl Proposal {
+    /// Sources that are clear, and other channels that would fit.
+    fn of(recognised: &Recognised, sources: &[SourceConfig], left_out: Vec<String>) -> Self {
+        let sources = sources.iter().map(|source| SourceTable {
+            name: source.name.clone(),
+            positions: source.position.iter().cloned().collect(),
+            velocities: source.velocity.iter().cloned().collect(),
+            datum: source.datum,
+            ..SourceTable::default()
+        });
+        let mut tables: Vec<SourceTable> = sources.collect();
+        let names: BTreeSet<String> = tables.iter().map(|t| t.name.clone()).collect();
+        let mut others = to_choose(&recognised.unused, &names);
+        remark(
+            &mut others,
+            "These hold positions or velocities too; their names don't say that they are a sensor's.",
+        );
+        tables.append(&mut others);
+        let warnings = recognised.warnings.iter().cloned().chain(left_out).collect();
+        Self { tables, undecided: None, warnings }
+    }
+
+    /// Channels of which a person must choose.
+    fn to_choose(what: String, candidates: &[Candidate]) -> Self {
+        let mut tables = to_choose(candidates, &BTreeSet::new());
+        remark(&mut tables, CHOOSE);
+        let likely = tables.iter().position(|t| is_datum_like(&t.name)).unwrap_or(0);
+        if let Some(table) = tables.get_mut(likely) {
+            table.datum = true;
+        }
+        Self { tables, undecided: Some(what), warnings: Vec::new() }
+    }
+
+    /// All that a person must read.
+    #[must_use]
+    pub fn all_warnings(&self) -> Vec<String> {
+        let undecided = self.undecided.as_ref().map(|what| {
+            format!(
+                "the config names no source yet, and `fuse` refuses it until it does: {}",
+                printable(what)
+            )
+        });
+        undecided.into_iter().chain(self.warnings.iter().cloned()).collect()
+    }
+}
+
+/// Candidates as comments, under names that are not taken.
+fn to_choose(candidates: &[Candidate], taken: &BTreeSet<String>) -> Vec<SourceTable> {
+    let choices = choices_of(candidates).into_iter().map(|choice| SourceTable {
+        name: if taken.contains(&choice.name) { format!("{} (other)", choice.name) } else { choice.name },
+        positions: choice.positions,
+        velocities: choice.velocities,
+        commented: true,
+        ..SourceTable::default()
+    });
+    choices.collect()
+}
+
+fn remark(tables: &mut [SourceTable], text: &str) {
+    if let Some(first) = tables.first_mut() {
+        first.remarks = vec![text.to_owned()];
+    }
+}
