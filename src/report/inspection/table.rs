@@ -62,7 +62,7 @@ impl Layout {
         let room = WIDTH - NUMBERS_WIDTH;
         let (topic, kind) =
             (longest(&|c| printable(&c.topic).chars().count()), longest(&|c| layout.kind(c).chars().count()));
-        let kind = kind.clamp(11, TYPE_WIDTH.max(room.saturating_sub(topic)));
+        let kind = kind.clamp(11, TYPE_WIDTH.max(room.saturating_sub(topic.max(5))));
         layout.topic_width = topic.clamp(5, room - kind);
         layout.type_width = kind;
         layout
