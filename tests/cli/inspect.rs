@@ -283,6 +283,14 @@ fn inspect_of_many_channels_stays_readable_and_shows_sources_first() {
     log.json("/evil\u{1b}[31m\n/x", 0.0, &json!({}));
     log.sensor("/tether/track", &Sensor::new(0.0, 8.0, 1));
     let (text, report) = inspect(log.finish(), 0);
+    for (topic, schema) in
+        [("", "a_very_long_name/".repeat(9)), ("/a/long/name".repeat(9).as_str(), "x".into())]
+    {
+        let mut log = TrialLog::new();
+        log.channel(topic, "json", (&schema, "jsonschema", "{}"));
+        log.json(topic, 0.0, &json!({}));
+        assert!(inspect(log.finish(), 0).0.lines().all(|l| l.chars().count() <= 120));
+    }
     assert_eq!(report["channels"].as_array().unwrap().len(), 152);
     let lines: Vec<&str> = text.lines().collect();
     assert!(lines.len() < 110, "{} lines", lines.len());

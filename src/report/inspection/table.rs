@@ -12,6 +12,9 @@ const WIDTH: usize = 120;
 /// What the columns behind the type take.
 const NUMBERS_WIDTH: usize = 70;
 
+/// What a type is cut to where topics are long.
+const TYPE_WIDTH: usize = 27;
+
 /// How many channels are listed that can't be sources; all of them stand in the JSON.
 const OTHERS_LISTED: usize = 40;
 
@@ -55,9 +58,12 @@ impl Layout {
         let mut layout = Self { topic_width: 0, type_width: 0, encoding };
         let longest =
             |text: &dyn Fn(&ChannelReport) -> usize| channels.iter().map(|c| text(c)).max().unwrap_or(0);
+        // Types may take what topics leave, and no more than they need is taken from topics.
         let room = WIDTH - NUMBERS_WIDTH;
-        let kind = longest(&|c| layout.kind(c).chars().count()).clamp(11, 27);
-        layout.topic_width = longest(&|c| printable(&c.topic).chars().count()).clamp(5, room - kind);
+        let (topic, kind) =
+            (longest(&|c| printable(&c.topic).chars().count()), longest(&|c| layout.kind(c).chars().count()));
+        let kind = kind.clamp(11, TYPE_WIDTH.max(room.saturating_sub(topic.max(5))));
+        layout.topic_width = topic.clamp(5, room - kind);
         layout.type_width = kind;
         layout
     }
