@@ -1,0 +1,230 @@
+//! Registration over many simulated runs of each family: errors against the truth, and what the bands cover.
+//!
+//! `cargo run --release --example registration_study -- [RUNS] [FAMILY...]`
+
+use std::thread;
+use std::time::Instant;
+
+use trackfuse::estimate::registration::{Registered, Settings, register};
+use trackfuse::sample::{Sample, Source};
+use trackfuse::simulate::{FAMILIES, Phases, Scenario, Simulation, simulate};
+use trackfuse::track::Curve;
+
+/// Errors of one phase: squares, values, and how many lie within 1.96 sigmas, of position and velocity.
+#[derive(Clone, Copy, Default)]
+struct Sum {
+    squares: [f64; 2],
+    count: usize,
+    inside: [usize; 2],
+}
+
+impl Sum {
+    fn add(&mut self, other: &Self) {
+        for q in 0..2 {
+            self.squares[q] += other.squares[q];
+            self.inside[q] += other.inside[q];
+        }
+        self.count += other.count;
+    }
+
+    fn rmse(&self, q: usize) -> f64 {
+        (3.0 * self.squares[q] / self.count as f64).sqrt()
+    }
+
+    fn coverage(&self, q: usize) -> f64 {
+        self.inside[q] as f64 / self.count as f64
+    }
+}
+
+#[derive(Clone, Default)]
+struct Outcome {
+    /// Phase 1, overlap, phase 2.
+    phases: [Sum; 3],
+    worst: f64,
+    worst_seed: u64,
+    seconds: f64,
+    iterations: usize,
+    unconverged: usize,
+    /// Squared errors of the beacon's errors over their sigmas, by unknown.
+    errors: [f64; 12],
+    z: [f64; 12],
+    runs: usize,
+    failed: usize,
+}
+
+fn sources(simulation: &Simulation) -> Vec<Source> {
+    let of = |name: &str| {
+        let record = simulation.sensor(name)?;
+        let sigma = if name == "tether" { 0.10 } else { 0.15 };
+        let sample = |time_s, v: &[f64]| Sample { time_s, value: [v[0], v[1], v[2]], sigma: [sigma; 3] };
+        let mut samples = record.samples.clone();
+        samples.sort_by(|a, b| a.stamp_s.total_cmp(&b.stamp_s));
+        Some(Source {
+            name: name.into(),
+            positions: samples.iter().map(|s| sample(s.stamp_s, s.position.as_slice())).collect(),
+            velocities: samples.iter().map(|s| sample(s.stamp_s, s.velocity.as_slice())).collect(),
+        })
+    };
+    ["tether", "beacon"].into_iter().filter_map(of).collect()
+}
+
+fn judge(simulation: &Simulation, registered: &Registered) -> [Sum; 3] {
+    let mut sums = [Sum::default(); 3];
+    let Phases { overlap_begin_s, overlap_end_s, t2_s, .. } = simulation.phases;
+    let (low, high) = (overlap_begin_s.min(overlap_end_s), overlap_begin_s.max(overlap_end_s));
+    for point in &simulation.truth {
+        if point.t_s > t2_s {
+            break;
+        }
+        let Some(state) = registered.curve.at(point.t_s) else { continue };
+        let phase = if point.t_s < low { 0 } else if point.t_s <= high { 1 } else { 2 };
+        let sum = &mut sums[phase];
+        for axis in 0..3 {
+            let errors = [
+                state.position[axis] - point.state.position[axis],
+                state.velocity[axis] - point.state.velocity[axis],
+            ];
+            let sigmas = [state.position_sigma[axis], state.velocity_sigma[axis]];
+            for q in 0..2 {
+                sum.squares[q] += errors[q] * errors[q];
+                sum.inside[q] += usize::from(errors[q].abs() <= 1.96 * sigmas[q]);
+            }
+            sum.count += 1;
+        }
+    }
+    sums
+}
+
+fn run(family: &str, seed: u64, correlation: f64) -> Outcome {
+    let mut scenario = Scenario { seed, ..Scenario::family(family).expect("a family") };
+    scenario.beacon.noise_correlation = correlation;
+    let simulation = simulate(&scenario).expect("a good scenario");
+    let sources = sources(&simulation);
+    let begun = Instant::now();
+    let pieces = [(0.0, simulation.phases.t2_s)];
+    let mut settings = Settings::default();
+    if std::env::var_os("WHITE").is_some() {
+        settings.correlated = false;
+    }
+    let Ok(registered) = register(&sources, 0, &pieces, &settings) else {
+        return Outcome { failed: 1, ..Outcome::default() };
+    };
+    let seconds = begun.elapsed().as_secs_f64();
+    let phases = judge(&simulation, &registered);
+    let mut outcome = Outcome {
+        phases,
+        worst: phases[2].rmse(0),
+        worst_seed: seed,
+        seconds,
+        iterations: registered.iterations,
+        unconverged: usize::from(!registered.converged),
+        runs: 1,
+        ..Outcome::default()
+    };
+    if sources.len() == 2 {
+        let truth = &simulation.sensor("beacon").expect("there").errors;
+        let (e, s) = (&registered.errors[1], &registered.sigmas[1]);
+        for axis in 0..3 {
+            for (k, found, true_value, sigma) in [
+                (axis, e.bias_m[axis], truth.bias_m[axis], s.bias_m[axis]),
+                (3 + axis, e.drift_m_s[axis], truth.drift_m_s[axis], s.drift_m_s[axis]),
+                (
+                    6 + axis,
+                    e.velocity_bias_m_s[axis],
+                    truth.velocity_bias_m_s[axis],
+                    s.velocity_bias_m_s[axis],
+                ),
+            ] {
+                outcome.errors[k] = (found - true_value).powi(2);
+                outcome.z[k] = ((found - true_value) / sigma.max(1e-12)).powi(2);
+            }
+        }
+        outcome.errors[9] = (e.clock_offset_s - truth.clock_offset_s).powi(2);
+        outcome.errors[10] = (e.scale - truth.scale).powi(2);
+        outcome.z[9] = outcome.errors[9] / s.clock_offset_s.powi(2).max(1e-24);
+        outcome.z[10] = outcome.errors[10] / s.scale.powi(2).max(1e-24);
+    }
+    outcome
+}
+
+fn study(family: &str, runs: u64, correlation: f64) -> Outcome {
+    const THREADS: u64 = 2;
+    let parts = thread::scope(|scope| {
+        let handles: Vec<_> = (0..THREADS)
+            .map(|part| {
+                scope.spawn(move || {
+                    let seeds = (1..=runs).filter(|seed| seed % THREADS == part);
+                    seeds.map(|seed| run(family, seed, correlation)).collect::<Vec<_>>()
+                })
+            })
+            .collect();
+        handles.into_iter().flat_map(|h| h.join().expect("no panic")).collect::<Vec<_>>()
+    });
+    let mut all = Outcome::default();
+    for one in parts {
+        (0..3).for_each(|p| all.phases[p].add(&one.phases[p]));
+        if one.worst > all.worst {
+            (all.worst, all.worst_seed) = (one.worst, one.worst_seed);
+        }
+        all.seconds += one.seconds;
+        all.iterations += one.iterations;
+        all.unconverged += one.unconverged;
+        all.runs += one.runs;
+        all.failed += one.failed;
+        (0..12).for_each(|k| all.errors[k] += one.errors[k]);
+        (0..12).for_each(|k| all.z[k] += one.z[k]);
+    }
+    all
+}
+
+fn main() {
+    let mut arguments = std::env::args().skip(1);
+    let runs: u64 = arguments.next().map_or(40, |a| a.parse().expect("a number of runs"));
+    let asked: Vec<String> = arguments.collect();
+    let families: Vec<(String, f64)> = if asked.is_empty() {
+        FAMILIES.iter().map(|f| ((*f).to_owned(), 0.0)).collect()
+    } else {
+        asked
+            .iter()
+            .map(|f| match f.split_once('@') {
+                Some((name, rho)) => (name.to_owned(), rho.parse().expect("a correlation")),
+                None => (f.clone(), 0.0),
+            })
+            .collect()
+    };
+    println!(
+        "family     rmse p 1/ov/2           v 1/ov/2          cover p            cover v            worst     it  ms fail"
+    );
+    let mut pooled = Sum::default();
+    for (family, correlation) in &families {
+        let all = study(family, runs, *correlation);
+        let [a, b, c] = &all.phases;
+        all.phases.iter().for_each(|p| pooled.add(p));
+        println!(
+            "{family:9} {:.4} {:.4} {:.4} | {:.3} {:.3} {:.3} | {:.3} {:.3} {:.3} | {:.3} {:.3} {:.3} | {:.2}@{} {:.1} {:.1} {}+{}",
+            a.rmse(0),
+            b.rmse(0),
+            c.rmse(0),
+            a.rmse(1),
+            b.rmse(1),
+            c.rmse(1),
+            a.coverage(0),
+            b.coverage(0),
+            c.coverage(0),
+            a.coverage(1),
+            b.coverage(1),
+            c.coverage(1),
+            all.worst,
+            all.worst_seed,
+            all.iterations as f64 / all.runs as f64,
+            1e3 * all.seconds / all.runs as f64,
+            all.unconverged,
+            all.failed,
+        );
+        if std::env::var_os("UNKNOWNS").is_some() {
+            let show = |v: &[f64; 12]| v.iter().take(11).map(|e| format!("{:.4}", (e / all.runs as f64).sqrt())).collect::<Vec<_>>().join(" ");
+            println!("  rms  {}\n  z    {}", show(&all.errors), show(&all.z));
+        }
+    }
+    println!("pooled coverage p {:.3} v {:.3}", pooled.coverage(0), pooled.coverage(1));
+}

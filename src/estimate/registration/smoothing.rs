@@ -1,0 +1,95 @@
+//! The weight of the jerk penalty by axis, by restricted maximum likelihood.
+//!
+//! -2 log L(lambda) = log|A + lambda Q| - rank(Q) log lambda + log|S + P| + z'Wz - fitted, everything of one axis
+//! with its own border: the unknowns that the axes share are taken as each axis' own, which the search forgives
+//! (Wood 2011, J. R. Stat. Soc. B 73, 3, has the joint form).
+
+use nalgebra::{DMatrix, DVector};
+
+use super::bordered::{Layout, Penalty, factor, products};
+use super::model::{COLUMNS, VALUE};
+use super::normal::Normal;
+use super::unknowns::{Kind, OF_AN_AXIS, index};
+use crate::math::scalar;
+
+/// The lambda of greatest restricted likelihood on `axis`, with unknowns of these prior `variances` (one an
+/// acting unknown).
+pub(super) fn likeliest_lambda(
+    normal: &Normal,
+    penalty: &Penalty,
+    layout: &Layout,
+    variances: &[f64],
+    axis: usize,
+) -> f64 {
+    let unit = normal.gram(axis).trace() / penalty.matrix.trace();
+    let own = own_unknowns(layout, variances, axis);
+    // beyond 1e8 the penalty would leave too few digits to the data
+    let found = scalar::minimise(-8.0, 8.0, 8, 0.05, |exponent| {
+        let lambda = unit * 10.0_f64.powf(exponent);
+        deviance(normal, penalty, &own, axis, lambda).unwrap_or(f64::INFINITY)
+    });
+    unit * 10.0_f64.powf(found.x)
+}
+
+/// Source, column and prior sigma of each unknown that acts on `axis`.
+fn own_unknowns(layout: &Layout, variances: &[f64], axis: usize) -> Vec<(usize, usize, f64)> {
+    let mut own = Vec::new();
+    for (slot, &source) in layout.slots.iter().enumerate() {
+        for column in 0..OF_AN_AXIS {
+            let wanted = index(slot, Kind::ALL[column], axis);
+            if let Ok(place) = layout.active.binary_search(&wanted) {
+                own.push((source, column, variances[place].sqrt()));
+            }
+        }
+    }
+    own
+}
+
+fn deviance(
+    normal: &Normal,
+    penalty: &Penalty,
+    own: &[(usize, usize, f64)],
+    axis: usize,
+    lambda: f64,
+) -> Option<f64> {
+    let cholesky = factor(normal.gram(axis), &penalty.matrix, lambda)?;
+    let halves: Vec<Vec<[f64; COLUMNS]>> = normal.border[axis]
+        .iter()
+        .map(|border| {
+            let mut half = border.clone();
+            cholesky.forward(&mut half);
+            half
+        })
+        .collect();
+    let sources = halves.len();
+    let complement: Vec<Vec<[[f64; COLUMNS]; COLUMNS]>> = (0..sources)
+        .map(|i| {
+            (0..sources)
+                .map(|j| {
+                    let mut block = products(&halves[i], &halves[j]);
+                    for (row, corner) in block.iter_mut().zip(&normal.corner[axis][i]) {
+                        for (value, corner) in row.iter_mut().zip(corner) {
+                            *value = if i == j { corner - *value } else { -*value };
+                        }
+                    }
+                    block
+                })
+                .collect()
+        })
+        .collect();
+    let k = own.len();
+    let precision = DMatrix::from_fn(k, k, |i, j| {
+        let ((s, a, p), (t, b, q)) = (own[i], own[j]);
+        complement[s][t][a][b] * p * q + f64::from(u8::from(i == j))
+    });
+    let score = DVector::from_fn(k, |i, _| {
+        let (s, a, p) = own[i];
+        p * (0..sources).map(|t| complement[s][t][a][VALUE]).sum::<f64>()
+    });
+    let residual: f64 = complement.iter().flatten().map(|block| block[VALUE][VALUE]).sum();
+    let border = precision.cholesky()?;
+    let explained = score.dot(&border.solve(&score));
+    let determinant: f64 = border.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum();
+    let spline = cholesky.log_determinant() - penalty.rank as f64 * lambda.ln();
+    Some(spline + determinant + residual - explained)
+}
