@@ -106,6 +106,9 @@ fn run(family: &str, seed: u64, correlation: f64) -> Outcome {
     if std::env::var_os("WHITE").is_some() {
         settings.correlated = false;
     }
+    if std::env::var_os("ALL").is_some() {
+        settings.select = false;
+    }
     let Ok(registered) = register(&sources, 0, &pieces, &settings) else {
         return Outcome { failed: 1, ..Outcome::default() };
     };

@@ -6,6 +6,7 @@ use super::knots::Knots;
 use super::model::{Anchor, Reference};
 use super::noise::{Level, Residuals};
 use super::normal::{Normal, Weighted, motion};
+use super::selection::{self, Inclusion};
 use super::smoothing::likeliest_lambda;
 use super::unknowns::{Kind, OF_A_SOURCE, Priors, SourceErrors, index, kind_of};
 use crate::estimate::{EstimateError, check, spline};
@@ -25,11 +26,13 @@ pub struct Settings {
     pub robust: bool,
     /// Whether the residuals' correlation widens.
     pub correlated: bool,
+    /// Whether unknowns that the data don't ask for are left out.
+    pub select: bool,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { priors: Priors::default(), knot_spacing_s: None, robust: true, correlated: true }
+        Self { priors: Priors::default(), knot_spacing_s: None, robust: true, correlated: true, select: true }
     }
 }
 
@@ -44,6 +47,8 @@ pub struct Registered {
     pub sigmas: Vec<SourceErrors>,
     /// Noise by source and quantity.
     pub levels: Vec<[Level; 2]>,
+    /// Which kinds of errors there are.
+    pub inclusions: Vec<Inclusion>,
     /// Weight of the jerk.
     pub lambda: [f64; 3],
     /// Steps taken.
@@ -64,6 +69,7 @@ struct Fit<'a> {
     weights: Vec<[Vec<f64>; 2]>,
     penalty: Penalty,
     posterior: Option<Posterior>,
+    inclusions: Vec<Inclusion>,
 }
 
 /// Registers.
@@ -87,7 +93,7 @@ pub fn register(
     for step in 0..40 {
         iterations = step + 1;
         let before = (fit.posterior.as_ref().map(|p| p.unknowns.clone()), fit.levels.clone());
-        fit.solve().ok_or_else(undetermined)?;
+        fit.solve(false).ok_or_else(undetermined)?;
         if step == 0 {
             fit.anchor();
         }
@@ -98,7 +104,7 @@ pub fn register(
             break;
         }
     }
-    fit.solve().ok_or_else(undetermined)?;
+    fit.solve(settings.select).ok_or_else(undetermined)?;
     Ok(fit.finish(iterations, converged))
 }
 
@@ -149,6 +155,7 @@ impl<'a> Fit<'a> {
             weights: sources.iter().map(|s| Quantity::ALL.map(|q| vec![1.0; s.series(q).len()])).collect(),
             penalty: Penalty { matrix, rank, lambda: [1.0; 3] },
             posterior: None,
+            inclusions: Vec::new(),
         }
     }
 
@@ -176,7 +183,7 @@ impl<'a> Fit<'a> {
         self.layout.active.iter().map(|&i| self.settings.priors.of(kind_of(i).0).powi(2)).collect()
     }
 
-    fn solve(&mut self) -> Option<()> {
+    fn solve(&mut self, select: bool) -> Option<()> {
         let latest = self.references.iter().map(|r| r.errors.clock_offset_s.abs()).fold(0.0, f64::max);
         let coefficients = match &self.posterior {
             Some(posterior) => posterior.coefficients.clone(),
@@ -206,7 +213,13 @@ impl<'a> Fit<'a> {
                 likeliest_lambda(&normal, &self.penalty, &self.layout, &variances, axis);
         }
         let eliminated = eliminate(&normal, &self.penalty, &self.layout)?;
-        let estimate = eliminated.information.with_prior(&variances)?;
+        let estimate = if select {
+            let averaged = selection::average(&eliminated.information, &self.layout, &self.settings.priors)?;
+            self.inclusions = averaged.inclusions;
+            averaged.estimate
+        } else {
+            eliminated.information.with_prior(&variances)?
+        };
         let posterior = eliminated.posterior(&self.layout, &estimate);
         for (slot, &source) in self.layout.slots.iter().enumerate() {
             self.references[source].errors = SourceErrors::of(&posterior.unknowns, slot);
@@ -277,6 +290,7 @@ impl<'a> Fit<'a> {
             errors: self.references.iter().map(|r| r.errors).collect(),
             sigmas,
             levels: self.levels,
+            inclusions: self.inclusions,
             lambda: self.penalty.lambda,
             iterations,
             converged,

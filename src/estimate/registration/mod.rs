@@ -7,6 +7,7 @@ mod knots;
 mod model;
 mod noise;
 mod normal;
+mod selection;
 mod smoothing;
 mod unknowns;
 
@@ -14,4 +15,5 @@ pub use curve::RegisteredCurve;
 pub use fit::{Registered, Settings, register};
 pub use model::Anchor;
 pub use noise::Level;
+pub use selection::Inclusion;
 pub use unknowns::{Kind, Priors, SourceErrors};
