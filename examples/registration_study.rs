@@ -106,6 +106,11 @@ fn run(family: &str, seed: u64, correlation: f64) -> Outcome {
     if std::env::var_os("WHITE").is_some() {
         settings.correlated = false;
     }
+    if let Ok(p) = std::env::var("PRIORS") {
+        let v: Vec<f64> = p.split(',').map(|x| x.parse().expect("a number")).collect();
+        let p = &mut settings.priors;
+        (p.bias_m, p.drift_m_s, p.velocity_bias_m_s, p.clock_offset_s, p.scale) = (v[0], v[1], v[2], v[3], v[4]);
+    }
     if std::env::var_os("ALL").is_some() {
         settings.select = false;
     }
@@ -182,6 +187,19 @@ fn study(family: &str, runs: u64, correlation: f64) -> Outcome {
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
+    if let Ok(seed) = std::env::var("SEED") {
+        let family = arguments.nth(1).expect("a family");
+        let seed = seed.parse().expect("a seed");
+        let simulation = simulate(&Scenario { seed, ..Scenario::family(&family).expect("a family") }).expect("good");
+        let sources = sources(&simulation);
+        let found = register(&sources, 0, &[(0.0, simulation.phases.t2_s)], &Settings::default()).expect("fits");
+        println!("{:?}", simulation.sensor("beacon").map(|s| s.errors));
+        println!("{:?}\n{:?}\n{:?}\n{:?} {:?} {} {}", found.errors[1], found.sigmas[1], found.inclusions, found.levels, found.lambda, found.iterations, found.converged);
+        for s in judge(&simulation, &found) {
+            println!("{:.4} {:.4} {:.3} {:.3}", s.rmse(0), s.rmse(1), s.coverage(0), s.coverage(1));
+        }
+        return;
+    }
     let runs: u64 = arguments.next().map_or(40, |a| a.parse().expect("a number of runs"));
     let asked: Vec<String> = arguments.collect();
     let families: Vec<(String, f64)> = if asked.is_empty() {

@@ -70,6 +70,8 @@ struct Fit<'a> {
     penalty: Penalty,
     posterior: Option<Posterior>,
     inclusions: Vec<Inclusion>,
+    effective: Option<Vec<f64>>,
+    relax: Vec<(f64, f64)>,
 }
 
 /// Registers.
@@ -102,6 +104,13 @@ pub fn register(
         if step > 7 && fit.settled(&before.0, &before.1) {
             converged = true;
             break;
+        }
+    }
+    if settings.select {
+        let n: usize = std::env::var("FIN").map_or(3, |v| v.parse().unwrap());
+        for _ in 0..n {
+            fit.solve(true).ok_or_else(undetermined)?;
+            fit.reweigh(Stage::Mixture);
         }
     }
     fit.solve(settings.select).ok_or_else(undetermined)?;
@@ -156,6 +165,8 @@ impl<'a> Fit<'a> {
             penalty: Penalty { matrix, rank, lambda: [1.0; 3] },
             posterior: None,
             inclusions: Vec::new(),
+            effective: None,
+            relax: vec![(1.0, 0.0); sources.len()],
         }
     }
 
@@ -180,6 +191,9 @@ impl<'a> Fit<'a> {
     }
 
     fn variances(&self) -> Vec<f64> {
+        if let Some(v) = &self.effective {
+            return v.clone();
+        }
         self.layout.active.iter().map(|&i| self.settings.priors.of(kind_of(i).0).powi(2)).collect()
     }
 
@@ -216,13 +230,27 @@ impl<'a> Fit<'a> {
         let estimate = if select {
             let averaged = selection::average(&eliminated.information, &self.layout, &self.settings.priors)?;
             self.inclusions = averaged.inclusions;
+            if std::env::var_os("NOEFF").is_none() { self.effective = Some(averaged.variances);}
             averaged.estimate
         } else {
             eliminated.information.with_prior(&variances)?
         };
         let posterior = eliminated.posterior(&self.layout, &estimate);
         for (slot, &source) in self.layout.slots.iter().enumerate() {
-            self.references[source].errors = SourceErrors::of(&posterior.unknowns, slot);
+            let mut errors = SourceErrors::of(&posterior.unknowns, slot);
+            let before = self.references[source].errors.clock_offset_s;
+            let full = errors.clock_offset_s - before;
+            let (relax, last) = &mut self.relax[slot];
+            if *last != 0.0 {
+                *relax = (*relax * *last / (*last - full)).clamp(0.25, 1.0);
+            }
+            if (*last - full).abs() == 0.0 || *last == 0.0 { *relax = 1.0; }
+            *last = full;
+            errors.clock_offset_s = before + *relax * full;
+            self.references[source].errors = errors;
+        }
+        if std::env::var_os("TRACE").is_some() {
+            eprintln!("tau {:.4} +- {:.4} bz {:.3} dev {:.3} lam {:?}", posterior.unknowns[9], posterior.covariance[(9, 9)].sqrt(), posterior.unknowns[2], eliminated.deviance_at_zero - 2.0 * estimate.log_evidence, self.penalty.lambda.map(|l| l.log10()));
         }
         self.posterior = Some(posterior);
         Some(())

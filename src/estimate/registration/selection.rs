@@ -17,10 +17,13 @@ use super::bordered::{Estimate, Information, Layout};
 use super::unknowns::{Kind, OF_A_SOURCE, Priors, kind_of};
 
 /// Standard deviations that a kind of error may have, over the prior's.
-const LEVELS: [f64; 4] = [0.0, 1.0 / 3.0, 1.0, 3.0];
+static EXP: std::sync::LazyLock<(Vec<f64>, Vec<f64>)> = std::sync::LazyLock::new(|| {
+    let v = |n: &str, d: &str| std::env::var(n).unwrap_or(d.into()).split(',').map(|x| x.parse().unwrap()).collect::<Vec<f64>>();
+    (v("LV", "0,0.3333,1,3"), v("SH", "0.4,0.2,0.2,0.2"))
+});
 
 /// How probable each is before anything is known.
-const LEVEL_SHARES: [f64; 4] = [0.4, 0.2, 0.2, 0.2];
+
 
 /// The level that the search begins with.
 const FIRST_LEVEL: u8 = 2;
@@ -46,6 +49,8 @@ pub struct Inclusion {
 pub(super) struct Averaged {
     pub(super) estimate: Estimate,
     pub(super) inclusions: Vec<Inclusion>,
+    /// The prior's variances, averaged.
+    pub(super) variances: Vec<f64>,
 }
 
 /// The acting unknowns that stand or fall together.
@@ -66,14 +71,22 @@ impl Models<'_> {
     fn estimate(&self, levels: &[u8]) -> Option<Estimate> {
         let mut variances = self.variances.to_vec();
         for (group, &level) in self.groups.iter().zip(levels) {
-            let factor = LEVELS[usize::from(level)].powi(2);
+            let factor = EXP.0[usize::from(level)].powi(2);
             group.members.iter().for_each(|&i| variances[i] *= factor);
         }
         self.information.with_prior(&variances)
     }
 
     fn log_weight(&self, levels: &[u8]) -> f64 {
-        let prior: f64 = levels.iter().map(|&l| LEVEL_SHARES[usize::from(l)].ln()).sum();
+        let g = levels.len();
+        let k = levels.iter().filter(|l| **l > 0).count();
+        let (a, b) = (EXP.1[0], EXP.1[1]);
+        // log of B(a+k, b+g-k)/B(a,b)
+        let mut prior = 0.0;
+        for i in 0..k { prior += (a + i as f64).ln(); }
+        for i in 0..g - k { prior += (b + i as f64).ln(); }
+        for i in 0..g { prior -= (a + b + i as f64).ln(); }
+        prior -= k as f64 * ((EXP.0.len() - 1) as f64).ln();
         self.estimate(levels).map_or(f64::NEG_INFINITY, |e| prior + e.log_evidence)
     }
 
@@ -88,7 +101,7 @@ impl Models<'_> {
             let Some((model, _)) = open.max_by(|a, b| a.1.total_cmp(b.1)) else { break };
             let model = model.clone();
             for group in 0..model.len() {
-                for level in 0..LEVELS.len() as u8 {
+                for level in 0..EXP.0.len() as u8 {
                     let mut near = model.clone();
                     near[group] = level;
                     if !weights.contains_key(&near) {
@@ -115,11 +128,16 @@ pub(super) fn average(information: &Information, layout: &Layout, priors: &Prior
     let mut mean = DVector::zeros(k);
     let mut second = DMatrix::zeros(k, k);
     let mut probabilities = vec![0.0; groups.len()];
+    let mut effective = vec![0.0; k];
     for (levels, weight) in &found {
         let share = weight / total;
         let one = models.estimate(levels)?;
         mean += share * &one.mean;
         second += share * (one.covariance + &one.mean * one.mean.transpose());
+        for (group, &level) in groups.iter().zip(levels) {
+            let factor = EXP.0[usize::from(level)].powi(2);
+            group.members.iter().for_each(|&i| effective[i] += share * factor * variances[i]);
+        }
         for (probability, &level) in probabilities.iter_mut().zip(levels) {
             *probability += if level == 0 { 0.0 } else { share };
         }
@@ -133,6 +151,7 @@ pub(super) fn average(information: &Information, layout: &Layout, priors: &Prior
     Some(Averaged {
         estimate: Estimate { mean, covariance, log_evidence: total.ln() },
         inclusions: inclusions.collect(),
+        variances: effective,
     })
 }
 
