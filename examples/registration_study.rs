@@ -155,6 +155,99 @@ fn run(family: &str, seed: u64, correlation: f64) -> Outcome {
     outcome
 }
 
+fn loaded(path: &std::path::Path) -> (Vec<Source>, usize, trackfuse::time::Time) {
+    let log = trackfuse::log::Log::open(path).expect("a log");
+    let configs = trackfuse::source::recognise(&log, "/fused").expect("sources").sources;
+    let (loaded, origin, _) = trackfuse::source::load(&log, &configs, false).expect("samples");
+    let configs: Vec<_> = loaded.iter().map(|l| l.config.clone()).collect();
+    (loaded.into_iter().map(|l| l.source).collect(), trackfuse::source::datum(&configs), origin)
+}
+
+fn flight(path: &std::path::Path) {
+    let (sources, datum, origin) = loaded(path);
+    let log = trackfuse::log::Log::open(path).expect("a log");
+    let config: trackfuse::config::SourceConfig = toml::from_str("name = \"truth\"\nposition = \"/cub1/pose.pose.position\"").expect("config");
+    let (truth, other, _) = trackfuse::source::load(&log, &[config], true).expect("truth");
+    let shift = other.seconds_since(origin);
+    for s in &sources { println!("{} {:?} p {} v {} sigma {:?}", s.name, s.span_s(), s.positions.len(), s.velocities.len(), s.positions.first().map(|p| p.sigma)); }
+    let from = sources.iter().filter_map(Source::span_s).map(|s| s.0).fold(f64::INFINITY, f64::min);
+    let to = sources.iter().filter_map(Source::span_s).map(|s| s.1).fold(f64::NEG_INFINITY, f64::max);
+    let begun = Instant::now();
+    let found = register(&sources, datum, &[(from, to)], &Settings::default()).expect("fits");
+    println!("{:.1?} {} {}", begun.elapsed(), found.iterations, found.converged);
+    for i in 0..sources.len() { println!("{:.4?}\n{:.4?}\n{:.3?}", found.errors[i], found.sigmas[i], found.levels[i]); }
+    println!("{:.3?} {:?}", found.inclusions, found.lambda);
+    let gauge_end = sources[datum].span_s().expect("samples").1;
+    let mut sums = [(0.0, 0.0, 0usize, 0usize); 2];
+    for p in &truth[0].source.positions {
+        let t = p.time_s + shift;
+        let Some(state) = found.curve.at(t) else { continue };
+        let s = &mut sums[usize::from(t > gauge_end)];
+        for a in 0..3 {
+            let e = state.position[a] - p.value[a];
+            s.0 += e * e;
+            s.1 += f64::from(u8::from(e.abs() < 1.96 * state.position_sigma[a]));
+            s.2 += 1;
+        }
+        s.3 += 1;
+    }
+    for s in sums { println!("rmse {:.4} cover {:.3} n {}", (s.0 / s.3 as f64).sqrt(), s.1 / s.2 as f64, s.3); }
+}
+
+fn climbs(folder: &std::path::Path, only: &[String]) {
+    let mut pooled = Sum::default();
+    for family in FAMILIES.iter().filter(|f| only.is_empty() || only.iter().any(|o| o == *f)) {
+        let mut phases = [Sum::default(); 3];
+        let mut worst = 0.0_f64;
+        for run in 0..4 {
+            let stem = folder.join(format!("{family}_{run}"));
+            let (sources, datum, origin) = loaded(&stem.with_extension("mcap"));
+            let json: serde_json::Value =
+                serde_json::from_slice(&std::fs::read(stem.with_extension("truth.json")).expect("truth")).expect("json");
+            let zero_s = trackfuse::time::Time::from_ns(json["epoch_ns"].as_i64().expect("ns")).seconds_since(origin);
+            let at = |k: &str| json["phases"][k].as_f64().expect("s");
+            let (low, high, t2) = (at("ov0").min(at("ov1")), at("ov0").max(at("ov1")), at("T2"));
+            let spans: Vec<_> = sources.iter().filter_map(Source::span_s).collect();
+            let from = spans.iter().map(|s| s.0).fold(f64::INFINITY, f64::min).min(zero_s);
+            let to = spans.iter().map(|s| s.1).fold(0.0, f64::max).max(zero_s + t2);
+            let found = register(&sources, datum, &[(from, to)], &Settings::default()).expect("fits");
+            if std::env::var_os("UNKNOWNS").is_some() {
+                for (i, s) in sources.iter().enumerate() {
+                    println!("  {} {:?} {:.2?} {:.3?} conv {} {}", s.name, s.positions.first().map(|p| p.sigma[0]), found.levels[i].map(|l| l.scale), found.levels[i].map(|l| l.correlation), found.converged, found.iterations);
+                    if i != datum { println!("    {:.3?}\n    {:.3?} truth {}", found.errors[i], found.sigmas[i], json["config"]["beacon"]); }
+                }
+            }
+            let mut own = Sum::default();
+            for line in std::fs::read_to_string(stem.with_extension("truth.csv")).expect("truth").lines().skip(1) {
+                let v: Vec<f64> = line.split(',').map(|x| x.parse().expect("a number")).collect();
+                if v[0] > t2 { break; }
+                let Some(state) = found.curve.at(zero_s + v[0]) else { continue };
+                let phase = if v[0] < low { 0 } else if v[0] <= high { 1 } else { 2 };
+                for sum in [&mut phases[phase], &mut own] {
+                    for axis in 0..3 {
+                        let errors = [state.position[axis] - v[1 + axis], state.velocity[axis] - v[4 + axis]];
+                        let sigmas = [state.position_sigma[axis], state.velocity_sigma[axis]];
+                        for q in 0..2 {
+                            sum.squares[q] += errors[q] * errors[q];
+                            sum.inside[q] += usize::from(errors[q].abs() <= 1.96 * sigmas[q]);
+                        }
+                        sum.count += 1;
+                    }
+                }
+            }
+            worst = worst.max(own.rmse(0));
+        }
+        let [a, b, c] = &phases;
+        phases.iter().for_each(|p| pooled.add(p));
+        println!(
+            "{family:9} {:.4} {:.4} {:.4} | {:.3} {:.3} {:.3} | {:.3} {:.3} {:.3} | {:.3} {:.3} {:.3} | {worst:.3}",
+            a.rmse(0), b.rmse(0), c.rmse(0), a.rmse(1), b.rmse(1), c.rmse(1),
+            a.coverage(0), b.coverage(0), c.coverage(0), a.coverage(1), b.coverage(1), c.coverage(1),
+        );
+    }
+    println!("pooled coverage p {:.3} v {:.3}", pooled.coverage(0), pooled.coverage(1));
+}
+
 fn study(family: &str, runs: u64, correlation: f64) -> Outcome {
     const THREADS: u64 = 2;
     let parts = thread::scope(|scope| {
@@ -198,6 +291,14 @@ fn main() {
         for s in judge(&simulation, &found) {
             println!("{:.4} {:.4} {:.3} {:.3}", s.rmse(0), s.rmse(1), s.coverage(0), s.coverage(1));
         }
+        return;
+    }
+    if let Ok(path) = std::env::var("FLIGHT") {
+        flight(std::path::Path::new(&path));
+        return;
+    }
+    if let Ok(folder) = std::env::var("CLIMBS") {
+        climbs(std::path::Path::new(&folder), &arguments.skip(1).collect::<Vec<_>>());
         return;
     }
     let runs: u64 = arguments.next().map_or(40, |a| a.parse().expect("a number of runs"));

@@ -142,7 +142,7 @@ impl Default for Priors {
             bias_m: 5.0,
             drift_m_s: 0.10,
             velocity_bias_m_s: 0.30,
-            clock_offset_s: 0.10,
+            clock_offset_s: 0.06,
             scale: 0.003,
             rotation_rad: 1.8,
         }
