@@ -106,6 +106,7 @@ fn run(family: &str, seed: u64, correlation: f64) -> Outcome {
     if std::env::var_os("WHITE").is_some() {
         settings.correlated = false;
     }
+    settings.knot_spacing_s = std::env::var("SPACING").ok().map(|v| v.parse().expect("s"));
     if let Ok(p) = std::env::var("PRIORS") {
         let v: Vec<f64> = p.split(',').map(|x| x.parse().expect("a number")).collect();
         let p = &mut settings.priors;
@@ -175,8 +176,8 @@ fn flight(path: &std::path::Path) {
     let begun = Instant::now();
     let found = register(&sources, datum, &[(from, to)], &Settings::default()).expect("fits");
     println!("{:.1?} {} {}", begun.elapsed(), found.iterations, found.converged);
-    for i in 0..sources.len() { println!("{:.4?}\n{:.4?}\n{:.3?}", found.errors[i], found.sigmas[i], found.levels[i]); }
-    println!("{:.3?} {:?}", found.inclusions, found.lambda);
+    for i in 0..sources.len() { println!("{:.4?}\n{:.4?}\n{:.3?}", found.errors[i], found.sigmas[i], found.noise[i]); }
+    println!("{:.3?} {:?}", found.unknowns, found.lambda);
     let gauge_end = sources[datum].span_s().expect("samples").1;
     let mut sums = [(0.0, 0.0, 0usize, 0usize); 2];
     for p in &truth[0].source.positions {
@@ -213,7 +214,7 @@ fn climbs(folder: &std::path::Path, only: &[String]) {
             let found = register(&sources, datum, &[(from, to)], &Settings::default()).expect("fits");
             if std::env::var_os("UNKNOWNS").is_some() {
                 for (i, s) in sources.iter().enumerate() {
-                    println!("  {} {:?} {:.2?} {:.3?} conv {} {}", s.name, s.positions.first().map(|p| p.sigma[0]), found.levels[i].map(|l| l.scale), found.levels[i].map(|l| l.correlation), found.converged, found.iterations);
+                    println!("  {} {:?} {:.2?} {:.3?} conv {} {}", s.name, s.positions.first().map(|p| p.sigma[0]), found.noise[i].map(|l| l.scale), found.noise[i].map(|l| l.correlation), found.converged, found.iterations);
                     if i != datum { println!("    {:.3?}\n    {:.3?} truth {}", found.errors[i], found.sigmas[i], json["config"]["beacon"]); }
                 }
             }
@@ -287,7 +288,7 @@ fn main() {
         let sources = sources(&simulation);
         let found = register(&sources, 0, &[(0.0, simulation.phases.t2_s)], &Settings::default()).expect("fits");
         println!("{:?}", simulation.sensor("beacon").map(|s| s.errors));
-        println!("{:?}\n{:?}\n{:?}\n{:?} {:?} {} {}", found.errors[1], found.sigmas[1], found.inclusions, found.levels, found.lambda, found.iterations, found.converged);
+        println!("{:?}\n{:?}\n{:?}\n{:?} {:?} {} {}", found.errors[1], found.sigmas[1], found.unknowns, found.noise, found.lambda, found.iterations, found.converged);
         for s in judge(&simulation, &found) {
             println!("{:.4} {:.4} {:.3} {:.3}", s.rmse(0), s.rmse(1), s.coverage(0), s.coverage(1));
         }

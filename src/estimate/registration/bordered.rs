@@ -22,6 +22,7 @@
 
 use nalgebra::{Cholesky as Dense, DMatrix, DVector, Dyn};
 
+use super::knots::Penalty;
 use super::model::{COLUMNS, VALUE};
 use super::normal::Normal;
 use super::unknowns::{Kind, OF_A_SOURCE, OF_AN_AXIS, index};
@@ -30,14 +31,6 @@ use crate::math::banded::{Banded, Cholesky};
 /// The ridge that is added, relative to the largest diagonal element, where rounding leaves the matrix not
 /// positive definite: data and penalty leave a direction open that the curve doesn't show.
 const RIDGE: f64 = 1e-13;
-
-/// The jerk penalty with its weight by axis.
-#[derive(Clone, Debug)]
-pub(super) struct Penalty {
-    pub(super) matrix: Banded,
-    pub(super) rank: usize,
-    pub(super) lambda: [f64; 3],
-}
 
 /// Which sources have unknowns, and which of these act.
 #[derive(Clone, Debug)]
@@ -97,8 +90,19 @@ pub(super) fn factor(gram: &Banded, penalty: &Banded, lambda: f64) -> Option<Cho
     })
 }
 
+/// `D - B' A^-1 B` of one axis for two sources, from what `a' b` makes of their borders: `D` is zero unless they are
+/// the same.
+pub(super) fn complement(
+    corner: Option<&[[f64; COLUMNS]; COLUMNS]>,
+    a: &[[f64; COLUMNS]],
+    b: &[[f64; COLUMNS]],
+) -> [[f64; COLUMNS]; COLUMNS] {
+    let products = products(a, b);
+    std::array::from_fn(|i| std::array::from_fn(|j| corner.map_or(0.0, |d| d[i][j]) - products[i][j]))
+}
+
 /// `a' b` of two blocks of columns.
-pub(super) fn products(a: &[[f64; COLUMNS]], b: &[[f64; COLUMNS]]) -> [[f64; COLUMNS]; COLUMNS] {
+fn products(a: &[[f64; COLUMNS]], b: &[[f64; COLUMNS]]) -> [[f64; COLUMNS]; COLUMNS] {
     let mut sum = [[0.0; COLUMNS]; COLUMNS];
     for (a, b) in a.iter().zip(b) {
         for i in 0..COLUMNS {
@@ -111,7 +115,12 @@ pub(super) fn products(a: &[[f64; COLUMNS]], b: &[[f64; COLUMNS]]) -> [[f64; COL
 }
 
 /// Eliminates the spline, or `None` where the data and the penalty leave it open.
-pub(super) fn eliminate(normal: &Normal, penalty: &Penalty, layout: &Layout) -> Option<Eliminated> {
+pub(super) fn eliminate(
+    normal: &Normal,
+    penalty: &Penalty,
+    lambda: [f64; 3],
+    layout: &Layout,
+) -> Option<Eliminated> {
     let places = layout.places();
     let k = layout.active.len();
     let mut information = Information { matrix: DMatrix::zeros(k, k), vector: DVector::zeros(k) };
@@ -119,12 +128,8 @@ pub(super) fn eliminate(normal: &Normal, penalty: &Penalty, layout: &Layout) -> 
     let mut factors = Vec::with_capacity(3);
     let mut solved = std::array::from_fn(|_| Vec::new());
     for axis in 0..3 {
-        let lambda = penalty.lambda[axis];
-        let cholesky = factor(normal.gram(axis), &penalty.matrix, lambda)?;
-        deviance += cholesky.log_determinant();
-        if lambda > 0.0 {
-            deviance -= penalty.rank as f64 * lambda.ln();
-        }
+        let cholesky = factor(normal.gram(axis), &penalty.matrix, lambda[axis])?;
+        deviance += cholesky.log_determinant() - penalty.rank as f64 * lambda[axis].ln();
         let columns = normal.border[axis].iter().map(|border| {
             let mut columns = border.clone();
             cholesky.solve(&mut columns);
@@ -138,12 +143,8 @@ pub(super) fn eliminate(normal: &Normal, penalty: &Penalty, layout: &Layout) -> 
         };
         for i in 0..sources {
             for j in 0..sources {
-                let mut complement = products(&normal.border[axis][i], &solved[axis][j]);
-                for (row, corner) in complement.iter_mut().zip(&normal.corner[axis][i]) {
-                    for (value, corner) in row.iter_mut().zip(corner) {
-                        *value = if i == j { corner - *value } else { -*value };
-                    }
-                }
+                let corner = (i == j).then_some(&normal.corner[axis][i]);
+                let complement = complement(corner, &normal.border[axis][i], &solved[axis][j]);
                 deviance += complement[VALUE][VALUE];
                 for a in 0..OF_AN_AXIS {
                     let Some(row) = place(i, a) else { continue };

@@ -1,186 +1,168 @@
-//! The order of steps.
+//! One joint fit: spline and unknowns, noise levels and smoothing, by turns until nothing moves.
 
-use super::bordered::{Layout, Penalty, Posterior, eliminate};
-use super::curve::RegisteredCurve;
-use super::knots::Knots;
+use super::bordered::{Layout, Posterior, eliminate};
+use super::knots::{Knots, Penalty};
 use super::model::{Anchor, Reference};
-use super::noise::{Level, Residuals};
+use super::noise::Level;
 use super::normal::{Normal, Weighted, motion};
-use super::selection::{self, Inclusion};
+use super::residuals::Residuals;
+use super::selection::{self, Averaged, Inclusion};
 use super::smoothing::likeliest_lambda;
-use super::unknowns::{Kind, OF_A_SOURCE, Priors, SourceErrors, index, kind_of};
-use crate::estimate::{EstimateError, check, spline};
+use super::unknowns::{Kind, OF_A_SOURCE, SourceErrors, index, kind_of};
+use super::{Settings, separation};
+use crate::estimate::spline;
 use crate::math::gaussian_basis::Active;
 use crate::math::robust;
-use crate::math::simd::{Kernel, vectorised};
-use crate::sample::{Quantity, Sample, Source};
+use crate::sample::{Quantity, Source};
 
-/// What may be chosen.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// What is thought of the errors before.
-    pub priors: Priors,
-    /// Knot spacing, s.
-    pub knot_spacing_s: Option<f64>,
-    /// Whether outliers are looked for.
-    pub robust: bool,
-    /// Whether the residuals' correlation widens.
-    pub correlated: bool,
-    /// Whether unknowns that the data don't ask for are left out.
-    pub select: bool,
-}
+/// Steps with weights that minimise absolute values, before outliers are told from noise.
+const FIRST_STEPS: usize = 6;
 
-impl Default for Settings {
-    fn default() -> Self {
-        Self { priors: Priors::default(), knot_spacing_s: None, robust: true, correlated: true, select: true }
-    }
-}
+/// Steps after which a fit that still moves is left as it is.
+const MOST_STEPS: usize = 40;
 
-/// What came out.
-#[derive(Clone, Debug)]
-pub struct Registered {
-    /// The curve.
-    pub curve: RegisteredCurve,
-    /// Errors by source; zeros for the datum.
-    pub errors: Vec<SourceErrors>,
-    /// Their standard deviations.
-    pub sigmas: Vec<SourceErrors>,
-    /// Noise by source and quantity.
-    pub levels: Vec<[Level; 2]>,
-    /// Which kinds of errors there are.
-    pub inclusions: Vec<Inclusion>,
-    /// Weight of the jerk.
-    pub lambda: [f64; 3],
-    /// Steps taken.
-    pub iterations: usize,
-    /// Whether the last step was small.
-    pub converged: bool,
-}
+/// Steps about the average over the models.
+const LAST_STEPS: usize = 3;
 
-struct Fit<'a> {
-    sources: &'a [Source],
-    settings: &'a Settings,
-    pieces: &'a [(f64, f64)],
-    spacing_s: f64,
-    knots: Knots,
-    references: Vec<Reference>,
-    layout: Layout,
-    levels: Vec<[Level; 2]>,
-    weights: Vec<[Vec<f64>; 2]>,
+/// A step is small that moves no unknown by more than this many of its sigmas,
+const SMALL_MOVE: f64 = 0.02;
+/// and no noise's variance by more than this share.
+const SMALL_CHANGE: f64 = 0.01;
+
+/// Knots beyond both ends of a piece for samples that a clock offset moves there, in sigmas of the prior.
+const PAD_SIGMAS: f64 = 8.0;
+
+/// No finer by default, s: velocity bands want a thrust's onset in 0.3 s to be followed.
+const FINEST_SPACING_S: f64 = 0.05;
+
+/// What is being fitted, and how far it is.
+pub(super) struct Fit<'a> {
+    pub(super) sources: &'a [Source],
+    pub(super) settings: &'a Settings,
+    pub(super) knots: Knots,
     penalty: Penalty,
-    posterior: Option<Posterior>,
-    inclusions: Vec<Inclusion>,
-    effective: Option<Vec<f64>>,
-    relax: Vec<(f64, f64)>,
+    pub(super) references: Vec<Reference>,
+    /// Whether the source's rotation is looked for.
+    rotated: Vec<bool>,
+    pub(super) layout: Layout,
+    pub(super) levels: Vec<[Level; 2]>,
+    /// Robust weights by source, quantity and sample.
+    pub(super) weights: Vec<[Vec<f64>; 2]>,
+    pub(super) lambda: [f64; 3],
+    relaxations: Vec<Relaxation>,
+    pub(super) posterior: Option<Posterior>,
+    pub(super) inclusions: Vec<Inclusion>,
+    pub(super) separations: Vec<(Option<(separation::Name, f64)>, separation::Separation)>,
+    pub(super) log_evidence: f64,
+    pub(super) iterations: usize,
+    pub(super) converged: bool,
 }
 
-/// Registers.
-///
-/// # Errors
-/// as the spline.
-pub fn register(
-    sources: &[Source],
-    datum: usize,
-    pieces: &[(f64, f64)],
-    settings: &Settings,
-) -> Result<Registered, EstimateError> {
-    check(sources)?;
-    let mut fit = Fit::start(sources, datum, pieces, settings);
-    let undetermined = || EstimateError::Undetermined {
-        what: "registration".into(),
-        why: "too few of them, or at too few instants",
-    };
-    let mut converged = false;
-    let mut iterations = 0;
-    for step in 0..40 {
-        iterations = step + 1;
-        let before = (fit.posterior.as_ref().map(|p| p.unknowns.clone()), fit.levels.clone());
-        fit.solve(false).ok_or_else(undetermined)?;
-        if step == 0 {
-            fit.anchor();
-        }
-        let stage = if step < 6 && settings.robust { Stage::First } else { Stage::Mixture };
-        fit.reweigh(stage);
-        if step > 7 && fit.settled(&before.0, &before.1) {
-            converged = true;
-            break;
-        }
-    }
-    if settings.select {
-        let n: usize = std::env::var("FIN").map_or(3, |v| v.parse().unwrap());
-        for _ in 0..n {
-            fit.solve(true).ok_or_else(undetermined)?;
-            fit.reweigh(Stage::Mixture);
-        }
-    }
-    fit.solve(settings.select).ok_or_else(undetermined)?;
-    Ok(fit.finish(iterations, converged))
-}
-
+/// Which way of weighing samples.
 #[derive(Clone, Copy, PartialEq)]
 enum Stage {
+    /// By absolute values.
     First,
+    /// By a mixture of scales.
     Mixture,
 }
 
+/// Which unknowns are thought to be there.
+#[derive(Clone, Copy, PartialEq)]
+enum Choice {
+    /// All.
+    All,
+    /// Those that the evidence asks for.
+    ByEvidence,
+}
+
 impl<'a> Fit<'a> {
+    /// Fits all `sources`, those with an angle turned by about that much against the datum. `None` where the data
+    /// leave the curve open.
+    pub(super) fn run(
+        sources: &'a [Source],
+        datum: usize,
+        pieces: &[(f64, f64)],
+        rotations: &[Option<f64>],
+        settings: &'a Settings,
+    ) -> Option<Self> {
+        let mut fit = Self::start(sources, datum, pieces, rotations, settings);
+        for step in 0..MOST_STEPS {
+            let before = (fit.posterior.as_ref().map(|p| p.unknowns.clone()), fit.levels.clone());
+            fit.solve(Choice::All)?;
+            if step == 0 {
+                fit.put_anchors_on_curve();
+            }
+            let first = settings.robust && step < FIRST_STEPS;
+            fit.reweigh(if first { Stage::First } else { Stage::Mixture });
+            fit.iterations = step + 1;
+            fit.converged = step > FIRST_STEPS + 1 && fit.is_settled(before.0.as_deref(), &before.1);
+            if fit.converged {
+                break;
+            }
+        }
+        if settings.select {
+            for _ in 0..LAST_STEPS {
+                fit.solve(Choice::ByEvidence)?;
+                fit.reweigh(Stage::Mixture);
+            }
+        }
+        fit.solve(if settings.select { Choice::ByEvidence } else { Choice::All })?;
+        Some(fit)
+    }
+
     fn start(
         sources: &'a [Source],
         datum: usize,
-        pieces: &'a [(f64, f64)],
+        pieces: &[(f64, f64)],
+        rotations: &[Option<f64>],
         settings: &'a Settings,
     ) -> Self {
-        let (from_s, to_s) = (pieces[0].0, pieces[pieces.len() - 1].1);
-        let spacing_s =
-            settings.knot_spacing_s.unwrap_or_else(|| spline::default_knot_spacing_s(sources, from_s, to_s));
-        let knots = Knots::covering(pieces, spacing_s, 0.25);
-        let (matrix, rank) = knots.jerk_penalty();
-        let centre = std::array::from_fn(|axis| {
-            let mut values: Vec<f64> =
-                sources.iter().flat_map(|s| &s.positions).map(|p| p.value[axis]).collect();
-            robust::median(&mut values).unwrap_or(0.0)
-        });
-        let references = sources
-            .iter()
-            .enumerate()
-            .map(|(i, source)| Reference {
-                anchor: Anchor { time_s: middle_s(source, &sources[datum]), point_m: centre },
-                errors: SourceErrors::default(),
-                is_datum: i == datum,
-                centre,
-            })
-            .collect();
+        let spacing_s = settings.knot_spacing_s.unwrap_or_else(|| spacing_s(sources, pieces));
+        let pad_s = PAD_SIGMAS * settings.priors.clock_offset_s;
+        let knots = Knots::covering(pieces, spacing_s, pad_s);
+        let centre = middle(sources);
+        let reference = |i: usize| Reference {
+            anchor: Anchor { time_s: common_s(&sources[i], &sources[datum]), point_m: centre },
+            errors: SourceErrors { rotation_rad: rotations[i].unwrap_or(0.0), ..SourceErrors::default() },
+            is_datum: i == datum,
+            centre,
+        };
         let slots: Vec<usize> = (0..sources.len()).filter(|&i| i != datum).collect();
-        let layout = Layout { slots, active: Vec::new() };
         Self {
             sources,
             settings,
-            pieces,
-            spacing_s,
+            penalty: knots.jerk_penalty(),
             knots,
-            references,
-            layout,
+            references: (0..sources.len()).map(reference).collect(),
+            rotated: rotations.iter().map(Option::is_some).collect(),
             levels: vec![[Level::default(); 2]; sources.len()],
             weights: sources.iter().map(|s| Quantity::ALL.map(|q| vec![1.0; s.series(q).len()])).collect(),
-            penalty: Penalty { matrix, rank, lambda: [1.0; 3] },
+            lambda: [1.0; 3],
+            relaxations: vec![Relaxation::default(); slots.len()],
+            layout: Layout { slots, active: Vec::new() },
             posterior: None,
             inclusions: Vec::new(),
-            effective: None,
-            relax: vec![(1.0, 0.0); sources.len()],
+            separations: Vec::new(),
+            log_evidence: 0.0,
+            iterations: 0,
+            converged: false,
         }
     }
 
-    fn acting(&self, with_curve: bool) -> Vec<usize> {
+    /// The unknowns that can act: not those of a quantity that isn't measured, and, while there is no curve, not
+    /// those that its motion multiplies.
+    fn acting(&self) -> Vec<usize> {
         let mut active = Vec::new();
         for (slot, &source) in self.layout.slots.iter().enumerate() {
-            let source = &self.sources[source];
+            let measures = Quantity::ALL.map(|q| !self.sources[source].series(q).is_empty());
             for own in 0..OF_A_SOURCE {
                 let (kind, axis) = kind_of(own);
                 let acts = match kind {
-                    Kind::Bias | Kind::Drift => !source.positions.is_empty(),
-                    Kind::VelocityBias => !source.velocities.is_empty(),
-                    Kind::ClockOffset | Kind::Scale => with_curve,
-                    Kind::Rotation => false,
+                    Kind::Bias | Kind::Drift => measures[0],
+                    Kind::VelocityBias => measures[1],
+                    Kind::ClockOffset | Kind::Scale => self.posterior.is_some(),
+                    Kind::Rotation => self.rotated[source] && self.posterior.is_some(),
                 };
                 if acts {
                     active.push(index(slot, kind, axis));
@@ -190,74 +172,71 @@ impl<'a> Fit<'a> {
         active
     }
 
-    fn variances(&self) -> Vec<f64> {
-        if let Some(v) = &self.effective {
-            return v.clone();
-        }
-        self.layout.active.iter().map(|&i| self.settings.priors.of(kind_of(i).0).powi(2)).collect()
-    }
-
-    fn solve(&mut self, select: bool) -> Option<()> {
-        let latest = self.references.iter().map(|r| r.errors.clock_offset_s.abs()).fold(0.0, f64::max);
-        let coefficients = match &self.posterior {
-            Some(posterior) => posterior.coefficients.clone(),
-            None => vec![[0.0; 3]; self.knots.count()],
-        };
-        let _ = latest;
-        self.layout.active = self.acting(self.posterior.is_some());
-        let totals: Vec<[Vec<f64>; 2]> = (0..self.sources.len())
-            .map(|s| {
-                [0, 1].map(|q| {
-                    let precision = self.levels[s][q].precision();
-                    self.weights[s][q].iter().map(|w| w * precision).collect()
-                })
-            })
-            .collect();
-        let mut series = Vec::new();
-        for (s, source) in self.sources.iter().enumerate() {
-            for (q, quantity) in Quantity::ALL.into_iter().enumerate() {
-                let samples = source.series(quantity);
-                series.push(Weighted { source: s, quantity, samples, weights: &totals[s][q] });
-            }
-        }
-        let normal = Normal::of(&self.knots, &series, &self.references, &coefficients);
-        let variances = self.variances();
+    fn solve(&mut self, choice: Choice) -> Option<()> {
+        self.layout.active = self.acting();
+        let normal = self.normal();
+        let priors = &self.settings.priors;
+        let variances: Vec<f64> =
+            self.layout.active.iter().map(|&i| priors.of(kind_of(i).0).powi(2)).collect();
         for axis in 0..3 {
-            self.penalty.lambda[axis] =
-                likeliest_lambda(&normal, &self.penalty, &self.layout, &variances, axis);
+            self.lambda[axis] = likeliest_lambda(&normal, &self.penalty, &self.layout, &variances, axis);
         }
-        let eliminated = eliminate(&normal, &self.penalty, &self.layout)?;
-        let estimate = if select {
-            let averaged = selection::average(&eliminated.information, &self.layout, &self.settings.priors)?;
-            self.inclusions = averaged.inclusions;
-            if std::env::var_os("NOEFF").is_none() { self.effective = Some(averaged.variances);}
-            averaged.estimate
-        } else {
-            eliminated.information.with_prior(&variances)?
-        };
-        let posterior = eliminated.posterior(&self.layout, &estimate);
-        for (slot, &source) in self.layout.slots.iter().enumerate() {
-            let mut errors = SourceErrors::of(&posterior.unknowns, slot);
-            let before = self.references[source].errors.clock_offset_s;
-            let full = errors.clock_offset_s - before;
-            let (relax, last) = &mut self.relax[slot];
-            if *last != 0.0 {
-                *relax = (*relax * *last / (*last - full)).clamp(0.25, 1.0);
+        let eliminated = eliminate(&normal, &self.penalty, self.lambda, &self.layout)?;
+        let information = &eliminated.information;
+        let estimate = match choice {
+            Choice::All => information.with_prior(&variances)?,
+            Choice::ByEvidence => {
+                let Averaged { estimate, inclusions } = selection::average(information, &self.layout, priors)?;
+                self.inclusions = inclusions;
+                estimate
             }
-            if (*last - full).abs() == 0.0 || *last == 0.0 { *relax = 1.0; }
-            *last = full;
-            errors.clock_offset_s = before + *relax * full;
-            self.references[source].errors = errors;
-        }
-        if std::env::var_os("TRACE").is_some() {
-            eprintln!("tau {:.4} +- {:.4} bz {:.3} dev {:.3} lam {:?}", posterior.unknowns[9], posterior.covariance[(9, 9)].sqrt(), posterior.unknowns[2], eliminated.deviance_at_zero - 2.0 * estimate.log_evidence, self.penalty.lambda.map(|l| l.log10()));
-        }
-        self.posterior = Some(posterior);
+        };
+        self.separations = separation::separations(information, &self.layout, priors);
+        self.log_evidence = estimate.log_evidence - 0.5 * eliminated.deviance_at_zero;
+        self.take(eliminated.posterior(&self.layout, &estimate));
         Some(())
     }
 
-    /// Puts the anchors' points onto the first curve.
-    fn anchor(&mut self) {
+    fn normal(&self) -> Normal {
+        let weights: Vec<[Vec<f64>; 2]> = self
+            .weights
+            .iter()
+            .zip(&self.levels)
+            .map(|(weights, levels)| {
+                let total = |q: usize| weights[q].iter().map(|w| w * levels[q].precision()).collect();
+                [total(0), total(1)]
+            })
+            .collect();
+        let series: Vec<Weighted<'_>> = (0..self.sources.len())
+            .flat_map(|source| Quantity::ALL.map(|quantity| (source, quantity)))
+            .map(|(source, quantity)| Weighted {
+                source,
+                quantity,
+                samples: self.sources[source].series(quantity),
+                weights: &weights[source][quantity as usize],
+            })
+            .collect();
+        let none = vec![[0.0; 3]; self.knots.count()];
+        let coefficients = self.posterior.as_ref().map_or(&none, |p| &p.coefficients);
+        Normal::of(&self.knots, &series, &self.references, coefficients)
+    }
+
+    /// Goes to a new solution, clock offsets by a part of the way where they would swing.
+    fn take(&mut self, posterior: Posterior) {
+        for (slot, &source) in self.layout.slots.iter().enumerate() {
+            let before = self.references[source].errors;
+            let mut errors = SourceErrors::of(&posterior.unknowns, slot);
+            let step = errors.clock_offset_s - before.clock_offset_s;
+            errors.clock_offset_s = before.clock_offset_s + self.relaxations[slot].shorten(step);
+            if !self.layout.active.contains(&index(slot, Kind::Rotation, 0)) {
+                errors.rotation_rad = before.rotation_rad;
+            }
+            self.references[source].errors = errors;
+        }
+        self.posterior = Some(posterior);
+    }
+
+    fn put_anchors_on_curve(&mut self) {
         let Some(posterior) = &self.posterior else { return };
         for reference in &mut self.references {
             let mut active = Active::default();
@@ -266,19 +245,20 @@ impl<'a> Fit<'a> {
         }
     }
 
+    /// What the current solution leaves of one series.
+    pub(super) fn residuals(&self, posterior: &Posterior, source: usize, quantity: Quantity) -> Residuals {
+        let slot = self.layout.slots.iter().position(|&s| s == source);
+        let samples = self.sources[source].series(quantity);
+        Residuals::of(&self.knots, posterior, &self.references[source], slot, quantity, samples)
+    }
+
     fn reweigh(&mut self, stage: Stage) {
-        let Some(posterior) = &self.posterior else { return };
-        for (s, source) in self.sources.iter().enumerate() {
-            for (q, quantity) in Quantity::ALL.into_iter().enumerate() {
-                let residuals = vectorised(ResidualsOf {
-                    knots: &self.knots,
-                    posterior,
-                    reference: &self.references[s],
-                    slot: self.layout.slots.iter().position(|&i| i == s),
-                    quantity,
-                    samples: source.series(quantity),
-                });
-                let (level, weights) = (&mut self.levels[s][q], &mut self.weights[s][q]);
+        let Some(posterior) = self.posterior.take() else { return };
+        for source in 0..self.sources.len() {
+            for quantity in Quantity::ALL {
+                let residuals = self.residuals(&posterior, source, quantity);
+                let level = &mut self.levels[source][quantity as usize];
+                let weights = &mut self.weights[source][quantity as usize];
                 match stage {
                     Stage::First => level.first_weights(&residuals, weights),
                     Stage::Mixture => {
@@ -290,91 +270,69 @@ impl<'a> Fit<'a> {
                 }
             }
         }
+        self.posterior = Some(posterior);
     }
 
-    fn settled(&self, unknowns: &Option<Vec<f64>>, levels: &[[Level; 2]]) -> bool {
-        let (Some(before), Some(posterior)) = (unknowns, &self.posterior) else { return false };
-        let near = |i: usize| {
+    fn is_settled(&self, before: Option<&[f64]>, levels: &[[Level; 2]]) -> bool {
+        let (Some(before), Some(posterior)) = (before, &self.posterior) else { return false };
+        let still = |i: usize| {
             let sigma = posterior.covariance[(i, i)].sqrt();
-            (posterior.unknowns[i] - before[i]).abs() <= 0.02 * sigma
+            (posterior.unknowns[i] - before[i]).abs() <= SMALL_MOVE * sigma
         };
-        let still = |a: &Level, b: &Level| {
-            (a.precision() / b.precision()).ln().abs() < 0.01
-        };
-        let levels_still =
-            self.levels.iter().flatten().zip(levels.iter().flatten()).all(|(a, b)| still(a, b));
-        levels_still && (0..before.len()).all(near)
+        let calm = |(a, b): (&Level, &Level)| (a.precision() / b.precision()).ln().abs() < SMALL_CHANGE;
+        self.levels.iter().flatten().zip(levels.iter().flatten()).all(calm) && (0..before.len()).all(still)
     }
+}
 
-    fn finish(self, iterations: usize, converged: bool) -> Registered {
-        let posterior = self.posterior.expect("solved");
-        let mut sigmas = vec![SourceErrors::default(); self.sources.len()];
-        let deviations: Vec<f64> =
-            (0..self.layout.len()).map(|i| posterior.covariance[(i, i)].sqrt()).collect();
-        for (slot, &source) in self.layout.slots.iter().enumerate() {
-            sigmas[source] = SourceErrors::of(&deviations, slot);
-        }
-        Registered {
-            errors: self.references.iter().map(|r| r.errors).collect(),
-            sigmas,
-            levels: self.levels,
-            inclusions: self.inclusions,
-            lambda: self.penalty.lambda,
-            iterations,
-            converged,
-            curve: RegisteredCurve {
-                knots: self.knots,
-                posterior,
-                centre: self.references[0].centre,
-                pieces: self.pieces.to_vec(),
-            },
-        }
+/// Shortens steps that swing to and fro (Aitken's relaxation): a clock offset that rests on a gap moves half the
+/// track, and Gauss-Newton overshoots.
+#[derive(Clone, Copy, Debug)]
+struct Relaxation {
+    share: f64,
+    last: f64,
+}
+
+impl Default for Relaxation {
+    fn default() -> Self {
+        Self { share: 1.0, last: 0.0 }
     }
+}
+
+impl Relaxation {
+    const SHORTEST: f64 = 0.25;
+
+    fn shorten(&mut self, step: f64) -> f64 {
+        let difference = self.last - step;
+        self.share = if self.last == 0.0 || difference == 0.0 {
+            1.0
+        } else {
+            (self.share * self.last / difference).clamp(Self::SHORTEST, 1.0)
+        };
+        self.last = step;
+        self.share * step
+    }
+}
+
+/// The fastest source's median interval, but no finer than 0.05 s, and no more knots than the spline's.
+fn spacing_s(sources: &[Source], pieces: &[(f64, f64)]) -> f64 {
+    let seen_s: f64 = pieces.iter().map(|p| p.1 - p.0).sum();
+    let fastest = sources.iter().filter_map(crate::estimate::coverage::median_interval_s);
+    let wanted = fastest.fold(f64::INFINITY, f64::min);
+    let wanted = if wanted.is_finite() { wanted.max(FINEST_SPACING_S) } else { FINEST_SPACING_S };
+    wanted.max(spline::finest_affordable_s(sources, 0.0, seen_s))
+}
+
+/// The medians of the positions: coefficients about it are small, and so are rounding and ripple.
+fn middle(sources: &[Source]) -> [f64; 3] {
+    std::array::from_fn(|axis| {
+        let mut values: Vec<f64> =
+            sources.iter().flat_map(|s| &s.positions).map(|p| p.value[axis]).collect();
+        robust::median(&mut values).unwrap_or(0.0)
+    })
 }
 
 /// The middle of the overlap, or of the gap, of two sources.
-fn middle_s(a: &Source, b: &Source) -> f64 {
+fn common_s(a: &Source, b: &Source) -> f64 {
     let (Some(a), Some(b)) = (a.span_s(), b.span_s()) else { return 0.0 };
     a.0.max(b.0).midpoint(a.1.min(b.1))
-}
-
-struct ResidualsOf<'a> {
-    knots: &'a Knots,
-    posterior: &'a Posterior,
-    reference: &'a Reference,
-    slot: Option<usize>,
-    quantity: Quantity,
-    samples: &'a [Sample],
-}
-
-impl Kernel for ResidualsOf<'_> {
-    type Output = Residuals;
-
-    #[inline(always)]
-    fn run(self) -> Residuals {
-        let Self { knots, posterior, reference, slot, quantity, samples } = self;
-        let mut residuals = Residuals::default();
-        let mut active = Active::default();
-        for sample in samples {
-            knots.evaluate(reference.time_s(sample.time_s), &mut active);
-            let motion = motion(&posterior.coefficients, &active, reference.centre);
-            let row = reference.row(quantity, sample, &motion);
-            let left = if reference.is_datum {
-                std::array::from_fn(|axis| sample.value[axis] - motion[quantity as usize][axis])
-            } else {
-                reference.residual(quantity, sample, &motion)
-            };
-            let b = if quantity == Quantity::Position { active.value() } else { active.slope() };
-            let sigma = reference.sigma(sample);
-            let mut leverage = 0.0;
-            for axis in 0..3 {
-                let own = slot.map(|slot| (slot, &row.columns[axis]));
-                let variance = posterior.variance(axis, active.first, b, row.gain, own);
-                leverage += variance / (sigma[axis] * sigma[axis]);
-            }
-            residuals.scaled.push(std::array::from_fn(|axis| left[axis] / sigma[axis]));
-            residuals.leverage.push(leverage);
-        }
-        residuals
-    }
 }

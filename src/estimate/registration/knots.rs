@@ -12,7 +12,7 @@ const MARGIN: usize = 4;
 /// Width of a Gaussian in knot spacings: a quintic B-spline gives the same to four digits.
 const WIDTH: f64 = 1.0;
 
-/// Gaussian functions over the pieces of a track, those of one piece behind those of the other.
+/// Gaussian functions over the pieces of a track, those of one piece behind those of the one before.
 #[derive(Clone, Debug)]
 pub(super) struct Knots {
     pieces: Vec<Piece>,
@@ -28,7 +28,7 @@ struct Piece {
 }
 
 impl Knots {
-    /// Knots `spacing_s` apart over each of `pieces`, and over `pad_s` beyond both of its ends.
+    /// Knots `spacing_s` apart over each of `pieces`, at least one, and over `pad_s` beyond both of its ends.
     pub(super) fn covering(pieces: &[(f64, f64)], spacing_s: f64, pad_s: f64) -> Self {
         let (mut made, mut count) = (Vec::with_capacity(pieces.len()), 0);
         for (i, &(from_s, to_s)) in pieces.iter().enumerate() {
@@ -47,33 +47,36 @@ impl Knots {
 
     /// Half-bandwidth of a Gram matrix of these functions.
     pub(super) fn half_bandwidth(&self) -> usize {
-        self.pieces[0].basis.half_bandwidth()
+        self.pieces.first().map_or(0, |p| p.basis.half_bandwidth())
     }
 
     /// The functions that are not zero at `t_s`, into what an earlier evaluation left.
     #[inline(always)]
     pub(super) fn evaluate(&self, t_s: f64, active: &mut Active) {
-        let piece = match self.pieces.as_slice() {
-            [only] => only,
-            several => {
-                let at = several.partition_point(|p| p.until_s < t_s);
-                &several[at.min(several.len() - 1)]
-            }
-        };
-        piece.basis.evaluate(t_s, active);
-        active.first += piece.offset;
+        let at = if self.pieces.len() > 1 { self.pieces.partition_point(|p| p.until_s < t_s) } else { 0 };
+        if let Some(piece) = self.pieces.get(at) {
+            piece.basis.evaluate(t_s, active);
+            active.first += piece.offset;
+        }
     }
 
-    /// The jerk penalty D3'D3, piece by piece, and its rank.
-    pub(super) fn jerk_penalty(&self) -> (Banded, usize) {
-        let (mut penalty, mut rank) = (Banded::zeros(self.count, PENALTY_ORDER), 0);
+    /// The jerk penalty D3'D3, piece by piece.
+    pub(super) fn jerk_penalty(&self) -> Penalty {
+        let (mut matrix, mut rank) = (Banded::zeros(self.count, PENALTY_ORDER), 0);
         for piece in &self.pieces {
             let rows = piece.basis.count().saturating_sub(PENALTY_ORDER);
             for row in 0..rows {
-                penalty.add_outer(piece.offset + row, &[-1.0, 3.0, -3.0, 1.0], 1.0);
+                matrix.add_outer(piece.offset + row, &[-1.0, 3.0, -3.0, 1.0], 1.0);
             }
             rank += rows;
         }
-        (penalty, rank)
+        Penalty { matrix, rank }
     }
+}
+
+/// The quadratic form of the jerk.
+#[derive(Clone, Debug)]
+pub(super) struct Penalty {
+    pub(super) matrix: Banded,
+    pub(super) rank: usize,
 }

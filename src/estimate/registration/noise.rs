@@ -11,6 +11,7 @@
 //! The expectation step of a mixture of scales (Dempster, Laird, Rubin 1977) and the estimate of a variance
 //! component by restricted likelihood (Patterson, Thompson 1971).
 
+use super::residuals::Residuals;
 use crate::math::robust;
 
 /// Scales of the mixture, in sigmas.
@@ -19,6 +20,12 @@ const SCALES: [f64; 3] = [1.0, 5.0, 100.0];
 /// Shares that the scales have before anything is known, worth this many samples.
 const PRIOR_SHARES: [f64; 3] = [0.98, 0.01, 0.01];
 const PRIOR_SAMPLES: f64 = 10.0;
+
+/// Beyond this nobody can tell noise from motion.
+const MOST_CORRELATION: f64 = 0.95;
+
+/// Noise this far below what was stated is none.
+const SMALLEST_SCALE: f64 = 1e-4;
 
 /// The median of a chi-square variable of three degrees of freedom.
 const CHI_SQUARE_3_MEDIAN: f64 = 2.365_973_884_375_338;
@@ -37,22 +44,6 @@ pub struct Level {
 impl Default for Level {
     fn default() -> Self {
         Self { scale: 1.0, correlation: 0.0, shares: PRIOR_SHARES }
-    }
-}
-
-/// What the fit left of one series.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Residuals {
-    /// By axis, in stated sigmas.
-    pub(super) scaled: Vec<[f64; 3]>,
-    /// The fit's variance at each sample in stated sigmas, summed over the axes.
-    pub(super) leverage: Vec<f64>,
-}
-
-impl Residuals {
-    /// q of each sample.
-    fn squares(&self) -> impl Iterator<Item = f64> {
-        self.scaled.iter().map(|r| r.iter().map(|x| x * x).sum())
     }
 }
 
@@ -101,7 +92,6 @@ impl Level {
     /// chance.
     pub(super) fn correlate(&mut self, residuals: &Residuals, weights: &[f64]) {
         let (mut products, mut squares, mut pairs) = (0.0, 0.0, 0.0);
-        let variance = self.scale * self.scale;
         for i in 1..weights.len() {
             let both = (weights[i] * weights[i - 1]).sqrt();
             for axis in 0..3 {
@@ -115,18 +105,11 @@ impl Level {
             squares += shared;
             pairs += 3.0 * both;
         }
-        let _ = variance;
         let found = if squares > 0.0 { (products / squares).clamp(0.0, MOST_CORRELATION) } else { 0.0 };
         let chance = 1.0 / f64::max(pairs, 1.0);
         self.correlation = found * found * found / (found * found + chance);
     }
 }
-
-/// Beyond this nobody can tell noise from motion.
-const MOST_CORRELATION: f64 = 0.95;
-
-/// Noise this far below what was stated is none.
-const SMALLEST_SCALE: f64 = 1e-4;
 
 fn responsibilities(shares: [f64; 3], q: f64) -> [f64; 3] {
     let logs: [f64; 3] = std::array::from_fn(|k| {

@@ -17,12 +17,15 @@ use super::bordered::{Estimate, Information, Layout};
 use super::unknowns::{Kind, OF_A_SOURCE, Priors, kind_of};
 
 /// Standard deviations that a kind of error may have, over the prior's.
-static EXP: std::sync::LazyLock<(Vec<f64>, Vec<f64>)> = std::sync::LazyLock::new(|| {
-    let v = |n: &str, d: &str| std::env::var(n).unwrap_or(d.into()).split(',').map(|x| x.parse().unwrap()).collect::<Vec<f64>>();
-    (v("LV", "0,0.3333,1,3"), v("SH", "0.4,0.2,0.2,0.2"))
-});
+const LEVELS: [f64; 4] = [0.0, 1.0 / 3.0, 1.0, 3.0];
 
-/// How probable each is before anything is known.
+/// How probable each of the levels is of an error that there is: three times the prior's sigma is rare.
+const LEVEL_SHARES: [f64; 4] = [f64::NAN, 0.4, 0.5, 0.1];
+
+/// Both parameters of the beta distribution of the share of errors that there are. One clock and one array with
+/// errors have them all, a calibrated pair has none: small, and what is found makes the rest more likely (Scott,
+/// Berger 2010, Ann. Stat. 38, 2587).
+const SHARE_OF_ERRORS: f64 = 0.25;
 
 
 /// The level that the search begins with.
@@ -36,21 +39,19 @@ const MOST_MODELS: usize = 3000;
 
 /// One kind of error of one source.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Inclusion {
+pub(super) struct Inclusion {
     /// Index of the source.
-    pub source: usize,
+    pub(super) source: usize,
     /// What kind of error.
-    pub kind: Kind,
+    pub(super) kind: Kind,
     /// How probable it is that there is one.
-    pub probability: f64,
+    pub(super) probability: f64,
 }
 
 /// The unknowns, averaged over the models.
 pub(super) struct Averaged {
     pub(super) estimate: Estimate,
     pub(super) inclusions: Vec<Inclusion>,
-    /// The prior's variances, averaged.
-    pub(super) variances: Vec<f64>,
 }
 
 /// The acting unknowns that stand or fall together.
@@ -71,22 +72,21 @@ impl Models<'_> {
     fn estimate(&self, levels: &[u8]) -> Option<Estimate> {
         let mut variances = self.variances.to_vec();
         for (group, &level) in self.groups.iter().zip(levels) {
-            let factor = EXP.0[usize::from(level)].powi(2);
+            let factor = LEVELS[usize::from(level)].powi(2);
             group.members.iter().for_each(|&i| variances[i] *= factor);
         }
         self.information.with_prior(&variances)
     }
 
     fn log_weight(&self, levels: &[u8]) -> f64 {
-        let g = levels.len();
-        let k = levels.iter().filter(|l| **l > 0).count();
-        let (a, b) = (EXP.1[0], EXP.1[1]);
-        // log of B(a+k, b+g-k)/B(a,b)
-        let mut prior = 0.0;
-        for i in 0..k { prior += (a + i as f64).ln(); }
-        for i in 0..g - k { prior += (b + i as f64).ln(); }
-        for i in 0..g { prior -= (a + b + i as f64).ln(); }
-        prior -= k as f64 * ((EXP.0.len() - 1) as f64).ln();
+        let sources: BTreeSet<usize> = self.groups.iter().map(|g| g.source).collect();
+        let of_source = |source| {
+            let own = self.groups.iter().zip(levels).filter(move |(g, _)| g.source == source);
+            let (all, some) = (own.clone().count(), own.filter(|(_, level)| **level > 0));
+            let shares: f64 = some.clone().map(|(_, &level)| LEVEL_SHARES[usize::from(level)].ln()).sum();
+            shares + log_share(some.count(), all)
+        };
+        let prior: f64 = sources.into_iter().map(of_source).sum();
         self.estimate(levels).map_or(f64::NEG_INFINITY, |e| prior + e.log_evidence)
     }
 
@@ -101,7 +101,7 @@ impl Models<'_> {
             let Some((model, _)) = open.max_by(|a, b| a.1.total_cmp(b.1)) else { break };
             let model = model.clone();
             for group in 0..model.len() {
-                for level in 0..EXP.0.len() as u8 {
+                for level in 0..LEVELS.len() as u8 {
                     let mut near = model.clone();
                     near[group] = level;
                     if !weights.contains_key(&near) {
@@ -128,16 +128,11 @@ pub(super) fn average(information: &Information, layout: &Layout, priors: &Prior
     let mut mean = DVector::zeros(k);
     let mut second = DMatrix::zeros(k, k);
     let mut probabilities = vec![0.0; groups.len()];
-    let mut effective = vec![0.0; k];
     for (levels, weight) in &found {
         let share = weight / total;
         let one = models.estimate(levels)?;
         mean += share * &one.mean;
         second += share * (one.covariance + &one.mean * one.mean.transpose());
-        for (group, &level) in groups.iter().zip(levels) {
-            let factor = EXP.0[usize::from(level)].powi(2);
-            group.members.iter().for_each(|&i| effective[i] += share * factor * variances[i]);
-        }
         for (probability, &level) in probabilities.iter_mut().zip(levels) {
             *probability += if level == 0 { 0.0 } else { share };
         }
@@ -151,8 +146,16 @@ pub(super) fn average(information: &Information, layout: &Layout, priors: &Prior
     Some(Averaged {
         estimate: Estimate { mean, covariance, log_evidence: total.ln() },
         inclusions: inclusions.collect(),
-        variances: effective,
+
     })
+}
+
+/// The log probability of one choice of `included` out of `count`, the share of errors integrated out:
+/// B(a + k, a + n - k) / B(a, a).
+fn log_share(included: usize, count: usize) -> f64 {
+    let rising = |from: f64, n: usize| (0..n).map(|i| (from + i as f64).ln()).sum::<f64>();
+    let a = SHARE_OF_ERRORS;
+    rising(a, included) + rising(a, count - included) - rising(2.0 * a, count)
 }
 
 /// The kinds of errors of each source; a rotation that is looked for stands beyond doubt.

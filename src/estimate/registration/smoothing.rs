@@ -6,7 +6,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::bordered::{Layout, Penalty, factor, products};
+use super::bordered::{Layout, complement, factor};
+use super::knots::Penalty;
 use super::model::{COLUMNS, VALUE};
 use super::normal::Normal;
 use super::unknowns::{Kind, OF_AN_AXIS, index};
@@ -61,32 +62,21 @@ fn deviance(
             half
         })
         .collect();
+    let block = |i: usize, j: usize| {
+        complement((i == j).then_some(&normal.corner[axis][i]), &halves[i], &halves[j])
+    };
     let sources = halves.len();
-    let complement: Vec<Vec<[[f64; COLUMNS]; COLUMNS]>> = (0..sources)
-        .map(|i| {
-            (0..sources)
-                .map(|j| {
-                    let mut block = products(&halves[i], &halves[j]);
-                    for (row, corner) in block.iter_mut().zip(&normal.corner[axis][i]) {
-                        for (value, corner) in row.iter_mut().zip(corner) {
-                            *value = if i == j { corner - *value } else { -*value };
-                        }
-                    }
-                    block
-                })
-                .collect()
-        })
-        .collect();
+    let blocks: Vec<Vec<_>> = (0..sources).map(|i| (0..sources).map(|j| block(i, j)).collect()).collect();
     let k = own.len();
     let precision = DMatrix::from_fn(k, k, |i, j| {
         let ((s, a, p), (t, b, q)) = (own[i], own[j]);
-        complement[s][t][a][b] * p * q + f64::from(u8::from(i == j))
+        blocks[s][t][a][b] * p * q + f64::from(u8::from(i == j))
     });
     let score = DVector::from_fn(k, |i, _| {
         let (s, a, p) = own[i];
-        p * (0..sources).map(|t| complement[s][t][a][VALUE]).sum::<f64>()
+        p * (0..sources).map(|t| blocks[s][t][a][VALUE]).sum::<f64>()
     });
-    let residual: f64 = complement.iter().flatten().map(|block| block[VALUE][VALUE]).sum();
+    let residual: f64 = blocks.iter().flatten().map(|block| block[VALUE][VALUE]).sum();
     let border = precision.cholesky()?;
     let explained = score.dot(&border.solve(&score));
     let determinant: f64 = border.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum();

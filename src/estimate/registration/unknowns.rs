@@ -136,13 +136,14 @@ pub struct Priors {
 }
 
 impl Default for Priors {
-    /// What acoustic positioning on a trial shows, by a prototype's choice; a rotation may be anything.
+    /// What acoustic positioning shows on trials; a rotation may be anything. The evidence looks at a third and at
+    /// three times of these too, so that they need only be of the right size.
     fn default() -> Self {
         Self {
-            bias_m: 5.0,
-            drift_m_s: 0.10,
+            bias_m: 3.0,
+            drift_m_s: 0.15,
             velocity_bias_m_s: 0.30,
-            clock_offset_s: 0.06,
+            clock_offset_s: 0.05,
             scale: 0.003,
             rotation_rad: 1.8,
         }

@@ -1,0 +1,77 @@
+//! What a fit leaves of the samples.
+
+use super::bordered::Posterior;
+use super::knots::Knots;
+use super::model::Reference;
+use super::normal::motion;
+use crate::math::gaussian_basis::Active;
+use crate::math::simd::{Kernel, vectorised};
+use crate::sample::{Quantity, Sample};
+
+/// What the fit left of one series.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Residuals {
+    /// By axis, in stated sigmas.
+    pub(super) scaled: Vec<[f64; 3]>,
+    /// The fit's variance at each sample in stated sigmas, summed over the axes.
+    pub(super) leverage: Vec<f64>,
+}
+
+impl Residuals {
+    /// Their squared lengths.
+    pub(super) fn squares(&self) -> impl Iterator<Item = f64> {
+        self.scaled.iter().map(|r| r.iter().map(|x| x * x).sum())
+    }
+
+    /// Those of one series of the source in `slot`, `None` for the datum.
+    pub(super) fn of(
+        knots: &Knots,
+        posterior: &Posterior,
+        reference: &Reference,
+        slot: Option<usize>,
+        quantity: Quantity,
+        samples: &[Sample],
+    ) -> Self {
+        vectorised(ResidualsOf { knots, posterior, reference, slot, quantity, samples })
+    }
+}
+
+struct ResidualsOf<'a> {
+    knots: &'a Knots,
+    posterior: &'a Posterior,
+    reference: &'a Reference,
+    slot: Option<usize>,
+    quantity: Quantity,
+    samples: &'a [Sample],
+}
+
+impl Kernel for ResidualsOf<'_> {
+    type Output = Residuals;
+
+    #[inline(always)]
+    fn run(self) -> Residuals {
+        let Self { knots, posterior, reference, slot, quantity, samples } = self;
+        let mut residuals = Residuals::default();
+        let mut active = Active::default();
+        for sample in samples {
+            knots.evaluate(reference.time_s(sample.time_s), &mut active);
+            let motion = motion(&posterior.coefficients, &active, reference.centre);
+            let row = reference.row(quantity, sample, &motion);
+            let left = reference.residual(quantity, sample, &motion);
+            let b = match quantity {
+                Quantity::Position => active.value(),
+                Quantity::Velocity => active.slope(),
+            };
+            let sigma = reference.sigma(sample);
+            let mut leverage = 0.0;
+            for axis in 0..3 {
+                let own = slot.map(|slot| (slot, &row.columns[axis]));
+                let variance = posterior.variance(axis, active.first, b, row.gain, own);
+                leverage += variance / (sigma[axis] * sigma[axis]);
+            }
+            residuals.scaled.push(std::array::from_fn(|axis| left[axis] / sigma[axis]));
+            residuals.leverage.push(leverage);
+        }
+        residuals
+    }
+}
