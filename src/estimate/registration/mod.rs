@@ -60,6 +60,9 @@ use super::coverage::Coverage;
 use super::{EstimateError, check, spline};
 use crate::sample::{Quantity, Source};
 
+#[cfg(test)]
+mod tests;
+
 /// What may be chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {

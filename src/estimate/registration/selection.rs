@@ -90,8 +90,8 @@ impl Models<'_> {
         self.estimate(levels).map_or(f64::NEG_INFINITY, |e| prior + e.log_evidence)
     }
 
-    /// The models of Occam's window with their log weights.
-    fn search(&self) -> Vec<(Vec<u8>, f64)> {
+    /// The models of Occam's window with their weights over the best one's, and the logarithm of that.
+    fn search(&self) -> (Vec<(Vec<u8>, f64)>, f64) {
         let start = vec![FIRST_LEVEL; self.groups.len()];
         let mut weights = BTreeMap::from([(start.clone(), self.log_weight(&start))]);
         let mut best = weights[&start];
@@ -113,7 +113,8 @@ impl Models<'_> {
             }
             expanded.insert(model);
         }
-        weights.into_iter().filter(|(_, w)| *w > best - WINDOW).map(|(m, w)| (m, (w - best).exp())).collect()
+        let inside = weights.into_iter().filter(|(_, w)| *w > best - WINDOW);
+        (inside.map(|(model, w)| (model, (w - best).exp())).collect(), best)
     }
 }
 
@@ -122,7 +123,7 @@ pub(super) fn average(information: &Information, layout: &Layout, priors: &Prior
     let variances: Vec<f64> = layout.active.iter().map(|&i| priors.of(kind_of(i).0).powi(2)).collect();
     let groups = groups(layout);
     let models = Models { information, variances: &variances, groups: &groups };
-    let found = models.search();
+    let (found, best) = models.search();
     let total: f64 = found.iter().map(|(_, w)| w).sum();
     let k = variances.len();
     let mut mean = DVector::zeros(k);
@@ -144,7 +145,7 @@ pub(super) fn average(information: &Information, layout: &Layout, priors: &Prior
         probability,
     });
     Some(Averaged {
-        estimate: Estimate { mean, covariance, log_evidence: total.ln() },
+        estimate: Estimate { mean, covariance, log_evidence: best + total.ln() },
         inclusions: inclusions.collect(),
 
     })

@@ -141,9 +141,9 @@ impl Default for Priors {
     fn default() -> Self {
         Self {
             bias_m: 3.0,
-            drift_m_s: 0.15,
+            drift_m_s: 0.10,
             velocity_bias_m_s: 0.30,
-            clock_offset_s: 0.05,
+            clock_offset_s: 0.06,
             scale: 0.003,
             rotation_rad: 1.8,
         }
