@@ -50,6 +50,8 @@ struct Outcome {
     z: [f64; 12],
     runs: usize,
     failed: usize,
+    turned: usize,
+    rejected: usize,
 }
 
 fn sources(simulation: &Simulation) -> Vec<Source> {
@@ -98,6 +100,10 @@ fn judge(simulation: &Simulation, registered: &Registered) -> [Sum; 3] {
 fn run(family: &str, seed: u64, correlation: f64) -> Outcome {
     let mut scenario = Scenario { seed, ..Scenario::family(family).expect("a family") };
     scenario.beacon.noise_correlation = correlation;
+    if let Ok(share) = std::env::var("OUTLIERS") {
+        let share = share.parse().expect("a share");
+        (scenario.tether.outlier_share, scenario.beacon.outlier_share) = (share, share);
+    }
     let simulation = simulate(&scenario).expect("a good scenario");
     let sources = sources(&simulation);
     let begun = Instant::now();
@@ -127,6 +133,8 @@ fn run(family: &str, seed: u64, correlation: f64) -> Outcome {
         seconds,
         iterations: registered.iterations,
         unconverged: usize::from(!registered.converged),
+        turned: registered.errors.iter().filter(|e| e.rotation_rad != 0.0).count(),
+        rejected: registered.rejected.len(),
         runs: 1,
         ..Outcome::default()
     };
@@ -273,6 +281,8 @@ fn study(family: &str, runs: u64, correlation: f64) -> Outcome {
         all.unconverged += one.unconverged;
         all.runs += one.runs;
         all.failed += one.failed;
+        all.turned += one.turned;
+        all.rejected += one.rejected;
         (0..12).for_each(|k| all.errors[k] += one.errors[k]);
         (0..12).for_each(|k| all.z[k] += one.z[k]);
     }
@@ -291,6 +301,30 @@ fn main() {
         println!("{:?}\n{:?}\n{:?}\n{:?} {:?} {} {}", found.errors[1], found.sigmas[1], found.unknowns, found.noise, found.lambda, found.iterations, found.converged);
         for s in judge(&simulation, &found) {
             println!("{:.4} {:.4} {:.3} {:.3}", s.rmse(0), s.rmse(1), s.coverage(0), s.coverage(1));
+        }
+        return;
+    }
+    if std::env::var_os("COST").is_some() {
+        for n in [3_000usize, 30_000, 100_000] {
+            let make = |from: f64, count: usize, step: f64, b: f64| {
+                let mut x = 1u64;
+                let mut noise = || { x = x.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407); 0.2 * ((x >> 11) as f64 / (1u64 << 53) as f64 - 0.5) };
+                let mut s = Source::default();
+                for i in 0..count {
+                    let t = from + step * i as f64;
+                    let p = std::array::from_fn(|a| 20.0 * (0.5 * t + a as f64).sin() + b + noise());
+                    let v = std::array::from_fn(|a| 10.0 * (0.5 * t + a as f64).cos() + noise());
+                    s.positions.push(Sample { time_s: t + b * 0.02, value: p, sigma: [0.06; 3] });
+                    s.velocities.push(Sample { time_s: t + b * 0.02, value: v, sigma: [0.06; 3] });
+                }
+                s
+            };
+            let end = n as f64 / 2.0 * 0.01;
+            let sources = [make(0.0, n / 2, 0.01, 0.0), make(end / 2.0, n / 2, 0.01, 1.0)];
+            let begun = Instant::now();
+            let found = register(&sources, 0, &[(0.0, 1.5 * end)], &Settings::default()).expect("fits");
+            let took = begun.elapsed().as_secs_f64();
+            println!("{n} instants: {:.2} s, {:.1} us a sample, {} knots, {} steps, {} rejected, {:?}", took, 1e6 * took / n as f64, found.knots, found.iterations, found.rejected.len(), found.errors[1]);
         }
         return;
     }
@@ -324,7 +358,7 @@ fn main() {
         let [a, b, c] = &all.phases;
         all.phases.iter().for_each(|p| pooled.add(p));
         println!(
-            "{family:9} {:.4} {:.4} {:.4} | {:.3} {:.3} {:.3} | {:.3} {:.3} {:.3} | {:.3} {:.3} {:.3} | {:.2}@{} {:.1} {:.1} {}+{}",
+            "{family:9} {:.4} {:.4} {:.4} | {:.3} {:.3} {:.3} | {:.3} {:.3} {:.3} | {:.3} {:.3} {:.3} | {:.2}@{} {:.1} {:.1} {}+{} turned {} rejected {:.1}",
             a.rmse(0),
             b.rmse(0),
             c.rmse(0),
@@ -343,6 +377,8 @@ fn main() {
             1e3 * all.seconds / all.runs as f64,
             all.unconverged,
             all.failed,
+            all.turned,
+            all.rejected as f64 / all.runs as f64,
         );
         if std::env::var_os("UNKNOWNS").is_some() {
             let show = |v: &[f64; 12]| v.iter().take(11).map(|e| format!("{:.4}", (e / all.runs as f64).sqrt())).collect::<Vec<_>>().join(" ");

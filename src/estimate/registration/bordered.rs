@@ -27,6 +27,7 @@ use super::model::{COLUMNS, VALUE};
 use super::normal::Normal;
 use super::unknowns::{Kind, OF_A_SOURCE, OF_AN_AXIS, index};
 use crate::math::banded::{Banded, Cholesky};
+use crate::math::simd::{Kernel, vectorised};
 
 /// The ridge that is added, relative to the largest diagonal element, where rounding leaves the matrix not
 /// positive definite: data and penalty leave a direction open that the curve doesn't show.
@@ -103,15 +104,29 @@ pub(super) fn complement(
 
 /// `a' b` of two blocks of columns.
 fn products(a: &[[f64; COLUMNS]], b: &[[f64; COLUMNS]]) -> [[f64; COLUMNS]; COLUMNS] {
-    let mut sum = [[0.0; COLUMNS]; COLUMNS];
-    for (a, b) in a.iter().zip(b) {
-        for i in 0..COLUMNS {
-            for j in 0..COLUMNS {
-                sum[i][j] += a[i] * b[j];
+    vectorised(Products { a, b })
+}
+
+struct Products<'a> {
+    a: &'a [[f64; COLUMNS]],
+    b: &'a [[f64; COLUMNS]],
+}
+
+impl Kernel for Products<'_> {
+    type Output = [[f64; COLUMNS]; COLUMNS];
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let mut sum = [[0.0; COLUMNS]; COLUMNS];
+        for (a, b) in self.a.iter().zip(self.b) {
+            for i in 0..COLUMNS {
+                for j in 0..COLUMNS {
+                    sum[i][j] += a[i] * b[j];
+                }
             }
         }
+        sum
     }
-    sum
 }
 
 /// Eliminates the spline, or `None` where the data and the penalty leave it open.

@@ -33,7 +33,7 @@ const SMALL_CHANGE: f64 = 0.01;
 const PAD_SIGMAS: f64 = 8.0;
 
 /// No finer by default, s: velocity bands want a thrust's onset in 0.3 s to be followed.
-const FINEST_SPACING_S: f64 = 0.05;
+const FINEST_SPACING_S: f64 = 0.04;
 
 /// What is being fitted, and how far it is.
 pub(super) struct Fit<'a> {
@@ -179,7 +179,9 @@ impl<'a> Fit<'a> {
         let variances: Vec<f64> =
             self.layout.active.iter().map(|&i| priors.of(kind_of(i).0).powi(2)).collect();
         for axis in 0..3 {
-            self.lambda[axis] = likeliest_lambda(&normal, &self.penalty, &self.layout, &variances, axis);
+            // everywhere at first, and once more when outliers are told from noise
+            let last = (![0, FIRST_STEPS].contains(&self.iterations)).then_some(self.lambda[axis]);
+            self.lambda[axis] = likeliest_lambda(&normal, &self.penalty, &self.layout, &variances, axis, last);
         }
         let eliminated = eliminate(&normal, &self.penalty, self.lambda, &self.layout)?;
         let information = &eliminated.information;
@@ -313,7 +315,7 @@ impl Relaxation {
     }
 }
 
-/// The fastest source's median interval, but no finer than 0.05 s, and no more knots than the spline's.
+/// The fastest source's median interval, but no finer than 0.04 s, and no more knots than the spline's.
 fn spacing_s(sources: &[Source], pieces: &[(f64, f64)]) -> f64 {
     let seen_s: f64 = pieces.iter().map(|p| p.1 - p.0).sum();
     let fastest = sources.iter().filter_map(crate::estimate::coverage::median_interval_s);

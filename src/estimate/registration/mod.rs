@@ -68,7 +68,7 @@ mod tests;
 pub struct Settings {
     /// What is thought of the errors before.
     pub priors: Priors,
-    /// Knot spacing, s; by default the fastest source's interval, but no finer than 0.05 s.
+    /// Knot spacing, s; by default the fastest source's interval, but no finer than 0.04 s.
     pub knot_spacing_s: Option<f64>,
     /// Whether outliers are looked for.
     pub robust: bool,

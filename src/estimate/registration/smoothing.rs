@@ -14,18 +14,26 @@ use super::unknowns::{Kind, OF_AN_AXIS, index};
 use crate::math::scalar;
 
 /// The lambda of greatest restricted likelihood on `axis`, with unknowns of these prior `variances` (one an
-/// acting unknown).
+/// acting unknown); looked for about the `last` one, or everywhere.
 pub(super) fn likeliest_lambda(
     normal: &Normal,
     penalty: &Penalty,
     layout: &Layout,
     variances: &[f64],
     axis: usize,
+    last: Option<f64>,
 ) -> f64 {
     let unit = normal.gram(axis).trace() / penalty.matrix.trace();
     let own = own_unknowns(layout, variances, axis);
     // beyond 1e8 the penalty would leave too few digits to the data
-    let found = scalar::minimise(-8.0, 8.0, 8, 0.05, |exponent| {
+    let (low, high, cells) = match last {
+        Some(last) => {
+            let middle = (last / unit).log10();
+            (f64::max(middle - 0.7, -8.0), f64::min(middle + 0.7, 8.0), 2)
+        }
+        None => (-8.0, 8.0, 8),
+    };
+    let found = scalar::minimise(low, high, cells, 0.05, |exponent| {
         let lambda = unit * 10.0_f64.powf(exponent);
         deviance(normal, penalty, &own, axis, lambda).unwrap_or(f64::INFINITY)
     });
@@ -62,11 +70,15 @@ fn deviance(
             half
         })
         .collect();
-    let block = |i: usize, j: usize| {
-        complement((i == j).then_some(&normal.corner[axis][i]), &halves[i], &halves[j])
-    };
     let sources = halves.len();
-    let blocks: Vec<Vec<_>> = (0..sources).map(|i| (0..sources).map(|j| block(i, j)).collect()).collect();
+    let mut blocks = vec![vec![[[0.0; COLUMNS]; COLUMNS]; sources]; sources];
+    for i in 0..sources {
+        for j in i..sources {
+            let corner = (i == j).then_some(&normal.corner[axis][i]);
+            blocks[i][j] = complement(corner, &halves[i], &halves[j]);
+            blocks[j][i] = std::array::from_fn(|a| std::array::from_fn(|b| blocks[i][j][b][a]));
+        }
+    }
     let k = own.len();
     let precision = DMatrix::from_fn(k, k, |i, j| {
         let ((s, a, p), (t, b, q)) = (own[i], own[j]);
