@@ -16,13 +16,13 @@ use crate::math::robust;
 use crate::sample::{Quantity, Source};
 
 /// Steps with weights that minimise absolute values, before outliers are told from noise.
-const FIRST_STEPS: usize = 6;
+const FIRST_STEPS: usize = 4;
 
 /// Steps after which a fit that still moves is left as it is.
 const MOST_STEPS: usize = 40;
 
 /// Steps about the average over the models.
-const LAST_STEPS: usize = 3;
+const LAST_STEPS: usize = 2;
 
 /// A step is small that moves no unknown by more than this many of its sigmas,
 const SMALL_MOVE: f64 = 0.02;
@@ -32,8 +32,14 @@ const SMALL_CHANGE: f64 = 0.01;
 /// Knots beyond both ends of a piece for samples that a clock offset moves there, in sigmas of the prior.
 const PAD_SIGMAS: f64 = 8.0;
 
+/// A clock offset that comes near the last of these knots begins anew with four times as many, so often at most.
+const MOST_WIDENINGS: usize = 3;
+
 /// No finer by default, s: velocity bands want a thrust's onset in 0.3 s to be followed.
 const FINEST_SPACING_S: f64 = 0.04;
+
+/// Decades about the last lambda that the next one is looked for in, at most.
+const WIDEST_SEARCH: f64 = 0.7;
 
 /// What is being fitted, and how far it is.
 pub(super) struct Fit<'a> {
@@ -49,6 +55,8 @@ pub(super) struct Fit<'a> {
     /// Robust weights by source, quantity and sample.
     pub(super) weights: Vec<[Vec<f64>; 2]>,
     pub(super) lambda: [f64; 3],
+    /// How far about the last lambda the next one is looked for, decades.
+    search_decades: [f64; 3],
     relaxations: Vec<Relaxation>,
     pub(super) posterior: Option<Posterior>,
     pub(super) inclusions: Vec<Inclusion>,
@@ -86,7 +94,22 @@ impl<'a> Fit<'a> {
         rotations: &[Option<f64>],
         settings: &'a Settings,
     ) -> Option<Self> {
-        let mut fit = Self::start(sources, datum, pieces, rotations, settings);
+        let mut pad_s = PAD_SIGMAS * settings.priors.clock_offset_s;
+        let mut fit = Self::once(Self::start(sources, datum, pieces, rotations, settings, pad_s))?;
+        for _ in 0..MOST_WIDENINGS {
+            let latest = fit.references.iter().map(|r| r.errors.clock_offset_s.abs()).fold(0.0, f64::max);
+            if latest < 0.8 * pad_s {
+                break;
+            }
+            pad_s *= 4.0;
+            fit = Self::once(Self::start(sources, datum, pieces, rotations, settings, pad_s))?;
+        }
+        Some(fit)
+    }
+
+    /// All steps from the start to the end.
+    fn once(mut fit: Self) -> Option<Self> {
+        let settings = fit.settings;
         for step in 0..MOST_STEPS {
             let before = (fit.posterior.as_ref().map(|p| p.unknowns.clone()), fit.levels.clone());
             fit.solve(Choice::All)?;
@@ -117,9 +140,9 @@ impl<'a> Fit<'a> {
         pieces: &[(f64, f64)],
         rotations: &[Option<f64>],
         settings: &'a Settings,
+        pad_s: f64,
     ) -> Self {
         let spacing_s = settings.knot_spacing_s.unwrap_or_else(|| spacing_s(sources, pieces));
-        let pad_s = PAD_SIGMAS * settings.priors.clock_offset_s;
         let knots = Knots::covering(pieces, spacing_s, pad_s);
         let centre = middle(sources);
         let reference = |i: usize| Reference {
@@ -139,6 +162,7 @@ impl<'a> Fit<'a> {
             levels: vec![[Level::default(); 2]; sources.len()],
             weights: sources.iter().map(|s| Quantity::ALL.map(|q| vec![1.0; s.series(q).len()])).collect(),
             lambda: [1.0; 3],
+            search_decades: [WIDEST_SEARCH; 3],
             relaxations: vec![Relaxation::default(); slots.len()],
             layout: Layout { slots, active: Vec::new() },
             posterior: None,
@@ -164,7 +188,7 @@ impl<'a> Fit<'a> {
                     Kind::ClockOffset | Kind::Scale => self.posterior.is_some(),
                     Kind::Rotation => self.rotated[source] && self.posterior.is_some(),
                 };
-                if acts {
+                if acts && self.settings.kinds.contains(&kind) {
                     active.push(index(slot, kind, axis));
                 }
             }
@@ -179,16 +203,23 @@ impl<'a> Fit<'a> {
         let variances: Vec<f64> =
             self.layout.active.iter().map(|&i| priors.of(kind_of(i).0).powi(2)).collect();
         for axis in 0..3 {
-            // everywhere at first, and once more when outliers are told from noise
-            let last = (![0, FIRST_STEPS].contains(&self.iterations)).then_some(self.lambda[axis]);
-            self.lambda[axis] = likeliest_lambda(&normal, &self.penalty, &self.layout, &variances, axis, last);
+            // everywhere at first, and again when outliers are told from noise
+            let anew = self.iterations == 0 || (FIRST_STEPS..FIRST_STEPS + 3).contains(&self.iterations);
+            let last = self.lambda[axis];
+            let about = (!anew).then_some((last, self.search_decades[axis]));
+            let lambda = likeliest_lambda(&normal, &self.penalty, &self.layout, &variances, axis, about);
+            let moved = (lambda / last).log10().abs();
+            self.search_decades[axis] =
+                if anew { WIDEST_SEARCH } else { (2.0 * moved).clamp(0.1, WIDEST_SEARCH) };
+            self.lambda[axis] = lambda;
         }
         let eliminated = eliminate(&normal, &self.penalty, self.lambda, &self.layout)?;
         let information = &eliminated.information;
         let estimate = match choice {
             Choice::All => information.with_prior(&variances)?,
             Choice::ByEvidence => {
-                let Averaged { estimate, inclusions } = selection::average(information, &self.layout, priors)?;
+                let Averaged { estimate, inclusions } =
+                    selection::average(information, &self.layout, priors)?;
                 self.inclusions = inclusions;
                 estimate
             }
@@ -251,7 +282,8 @@ impl<'a> Fit<'a> {
     pub(super) fn residuals(&self, posterior: &Posterior, source: usize, quantity: Quantity) -> Residuals {
         let slot = self.layout.slots.iter().position(|&s| s == source);
         let samples = self.sources[source].series(quantity);
-        Residuals::of(&self.knots, posterior, &self.references[source], slot, quantity, samples)
+        let reference = &self.references[source];
+        Residuals::of(&self.knots, posterior, reference, slot, quantity, samples)
     }
 
     fn reweigh(&mut self, stage: Stage) {
@@ -265,9 +297,7 @@ impl<'a> Fit<'a> {
                     Stage::First => level.first_weights(&residuals, weights),
                     Stage::Mixture => {
                         level.step(&residuals, weights, self.settings.robust);
-                        if self.settings.correlated {
-                            level.correlate(&residuals, weights);
-                        }
+                        level.correlate(&residuals, weights);
                     }
                 }
             }
@@ -327,8 +357,7 @@ fn spacing_s(sources: &[Source], pieces: &[(f64, f64)]) -> f64 {
 /// The medians of the positions: coefficients about it are small, and so are rounding and ripple.
 fn middle(sources: &[Source]) -> [f64; 3] {
     std::array::from_fn(|axis| {
-        let mut values: Vec<f64> =
-            sources.iter().flat_map(|s| &s.positions).map(|p| p.value[axis]).collect();
+        let mut values: Vec<f64> = sources.iter().flat_map(|s| &s.positions).map(|p| p.value[axis]).collect();
         robust::median(&mut values).unwrap_or(0.0)
     })
 }

@@ -19,16 +19,19 @@
 //! | R | rotation about the vertical, used only if the evidence asks for it | 1 | rad |
 //! | t_m, q | anchor: the middle of the overlap, or of the gap, and the track's point there | 1, 3 | s, m |
 //!
-//! Zhang 2025 has no registration, and says so. The parts, each in a file of its own:
+//! Zhang 2025 has no registration, and says so. Steps, by turns until nothing moves: linear about the last estimate;
+//! smoothing; solution; noise levels and weights. At the end the unknowns are averaged over the models.
+//! The parts, each in a file of its own:
 //!
-//! 1. [`model`]: the equations above, linear about the last estimate (Gauss-Newton).
-//! 2. [`normal`], [`bordered`]: an arrowhead system, its banded blocks eliminated by the Schur complement; the
-//!    posterior covariance of the curve holds the border's share.
-//! 3. [`smoothing`]: the jerk's weight by restricted maximum likelihood (Wood 2011).
-//! 4. [`noise`]: noise levels as variance components, outliers by a mixture of scales, correlated noise widens.
-//! 5. [`selection`]: which errors there are, by evidence, averaged (MacKay 1992).
-//! 6. [`separation`]: which unknowns the data can tell apart.
-//! 7. [`rotation`]: where to begin with a large angle (Procrustes).
+//! | file | what |
+//! |---|---|
+//! | `model` | the equations above, linear about the last estimate (Gauss-Newton) |
+//! | `normal`, `bordered` | an arrowhead system, its banded blocks eliminated by the Schur complement; the curve's posterior covariance holds the border's share |
+//! | `smoothing` | the jerk's weight by restricted maximum likelihood (Wood 2011) |
+//! | `noise`, `residuals` | noise levels as variance components, outliers by a mixture of scales, correlated noise widens |
+//! | `selection` | which errors there are, by evidence, averaged (MacKay 1992; Madigan, Raftery 1994) |
+//! | `separation` | which unknowns the data can tell apart |
+//! | `rotation` | where to begin with a large angle (Procrustes) |
 //!
 //! Only differences are seen: an error that all sources share, or one of the datum, stays in the track and in no
 //! band.
@@ -64,31 +67,28 @@ use crate::sample::{Quantity, Source};
 mod tests;
 
 /// What may be chosen.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
+    /// The kinds of errors that may be there; a rotation is looked for where the evidence asks for it.
+    pub kinds: Vec<Kind>,
     /// What is thought of the errors before.
     pub priors: Priors,
+    /// Whether errors that the data don't ask for are left out.
+    pub select: bool,
     /// Knot spacing, s; by default the fastest source's interval, but no finer than 0.04 s.
     pub knot_spacing_s: Option<f64>,
     /// Whether outliers are looked for.
     pub robust: bool,
-    /// Whether the residuals' correlation widens the bands.
-    pub correlated: bool,
-    /// Whether errors that the data don't ask for are left out.
-    pub select: bool,
-    /// Whether rotations are looked for.
-    pub rotations: bool,
 }
 
 impl Default for Settings {
     fn default() -> Self {
         Self {
+            kinds: Kind::ALL.to_vec(),
             priors: Priors::default(),
+            select: true,
             knot_spacing_s: None,
             robust: true,
-            correlated: true,
-            select: true,
-            rotations: true,
         }
     }
 }
@@ -172,7 +172,7 @@ pub fn register(
     let mut rotations = vec![None; sources.len()];
     let run = |rotations: &[Option<f64>]| Fit::run(sources, datum, pieces, rotations, settings);
     let mut best = run(&rotations);
-    if settings.rotations {
+    if settings.kinds.contains(&Kind::Rotation) {
         let coverage = Coverage::of(sources);
         for source in (0..sources.len()).filter(|&s| s != datum) {
             for angle in rotation::candidates(sources, datum, source, &coverage, &settings.priors) {

@@ -131,9 +131,8 @@ impl Reference {
                 ),
                 Quantity::Velocity => (-gain * motion[2][axis], motion[1][axis], 0.0),
             };
-            let moved = errors.clock_offset_s * clock
-                + errors.scale * scale
-                + errors.rotation_rad * across[axis];
+            let moved =
+                errors.clock_offset_s * clock + errors.scale * scale + errors.rotation_rad * across[axis];
             let value = measured[axis] + zero + moved;
             columns[axis] = match quantity {
                 Quantity::Position => {

@@ -8,6 +8,9 @@
 //! phi     = sum weight q / (3 n - degrees of freedom of the fit)                                       (2)
 //! ```
 //!
+//! For the outliers q is that of the residuals over their own standard deviation, sigma sqrt(1 - h) with h the share of
+//! the sample in its own fit: at an end of the track the curve follows a single wild sample.
+//!
 //! The expectation step of a mixture of scales (Dempster, Laird, Rubin 1977) and the estimate of a variance
 //! component by restricted likelihood (Patterson, Thompson 1971).
 
@@ -56,10 +59,15 @@ impl Level {
 
     /// First weights, of a fit that may be far off: those that minimise absolute values, the scale from the median.
     pub(super) fn first_weights(&mut self, residuals: &Residuals, weights: &mut [f64]) {
-        let mut squares: Vec<f64> = residuals.squares().collect();
-        let Some(median) = robust::median(&mut squares) else { return };
+        let precision = self.precision();
+        let squares: Vec<f64> = weights
+            .iter()
+            .enumerate()
+            .map(|(i, weight)| residuals.predicted_square(i, weight * precision))
+            .collect();
+        let Some(median) = robust::median(&mut squares.clone()) else { return };
         self.scale = (median / CHI_SQUARE_3_MEDIAN).sqrt().max(SMALLEST_SCALE);
-        for (weight, q) in weights.iter_mut().zip(residuals.squares()) {
+        for (weight, q) in weights.iter_mut().zip(squares) {
             *weight = (3.0 * self.scale * self.scale / q.max(f64::MIN_POSITIVE)).sqrt().min(1.0);
         }
     }
@@ -70,18 +78,19 @@ impl Level {
         if weights.is_empty() {
             return;
         }
-        let variance = self.scale * self.scale;
+        let (variance, precision) = (self.scale * self.scale, self.precision());
         if robust {
             let mut counts = PRIOR_SHARES.map(|share| share * PRIOR_SAMPLES);
-            for (weight, q) in weights.iter_mut().zip(residuals.squares()) {
+            for (i, weight) in weights.iter_mut().enumerate() {
+                let q = residuals.predicted_square(i, *weight * precision);
                 let gamma = responsibilities(self.shares, q / variance);
                 *weight = (0..3).map(|k| gamma[k] / (SCALES[k] * SCALES[k])).sum(); // (1)
                 (0..3).for_each(|k| counts[k] += gamma[k]);
             }
             self.shares = counts.map(|c| c / (n + PRIOR_SAMPLES));
         }
-        let precision = self.precision();
-        let freedom = weights.iter().zip(&residuals.leverage).map(|(w, l)| w * l * precision).sum::<f64>();
+        let leverages = residuals.leverage.iter().map(|l| l.iter().sum::<f64>());
+        let freedom: f64 = weights.iter().zip(leverages).map(|(w, l)| w * l * precision).sum();
         let sum: f64 = weights.iter().zip(residuals.squares()).map(|(w, q)| w * q).sum();
         // one sample's worth of the stated sigma, so that two samples don't claim to be exact
         let left = (3.0 * n - freedom).max(0.3 * n);
@@ -100,7 +109,8 @@ impl Level {
                 squares += 0.5 * both * (a * a + b * b);
             }
             // a fit leaves neighbours with minus its variance in common
-            let shared = both * residuals.leverage[i].midpoint(residuals.leverage[i - 1]);
+            let shared: f64 =
+                (0..3).map(|a| both * residuals.leverage[i][a].midpoint(residuals.leverage[i - 1][a])).sum();
             products += shared;
             squares += shared;
             pairs += 3.0 * both;

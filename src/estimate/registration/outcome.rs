@@ -19,10 +19,17 @@ impl Fit<'_> {
                     continue;
                 }
                 let residuals = self.residuals(&posterior, source, quantity);
-                for (index, (weight, q)) in weights.iter().zip(residuals.squares()).enumerate() {
+                for (index, weight) in weights.iter().enumerate() {
                     if *weight < REJECTED_WEIGHT {
                         let time_s = self.sources[source].series(quantity)[index].time_s;
-                        rejected.push(Rejected { source, quantity, index, time_s, sigmas: q.sqrt() / level.scale });
+                        let q = residuals.predicted_square(index, weight * level.precision());
+                        rejected.push(Rejected {
+                            source,
+                            quantity,
+                            index,
+                            time_s,
+                            sigmas: q.sqrt() / level.scale,
+                        });
                     }
                 }
             }

@@ -8,19 +8,29 @@ use crate::math::gaussian_basis::Active;
 use crate::math::simd::{Kernel, vectorised};
 use crate::sample::{Quantity, Sample};
 
+/// What rounding leaves of 1 - h.
+const SMALLEST_REST: f64 = 1e-6;
+
 /// What the fit left of one series.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Residuals {
     /// By axis, in stated sigmas.
     pub(super) scaled: Vec<[f64; 3]>,
-    /// The fit's variance at each sample in stated sigmas, summed over the axes.
-    pub(super) leverage: Vec<f64>,
+    /// The fit's variance at each sample by axis, in stated sigmas.
+    pub(super) leverage: Vec<[f64; 3]>,
 }
 
 impl Residuals {
     /// Their squared lengths.
     pub(super) fn squares(&self) -> impl Iterator<Item = f64> {
         self.scaled.iter().map(|r| r.iter().map(|x| x * x).sum())
+    }
+
+    /// The squared length of one of them over its own standard deviation, in a fit that gave its sample so many times
+    /// the stated weight: r^2 / (1 - h).
+    pub(super) fn predicted_square(&self, i: usize, weight: f64) -> f64 {
+        let (left, leverage) = (self.scaled[i], self.leverage[i]);
+        (0..3).map(|a| left[a] * left[a] / (1.0 - weight * leverage[a]).max(SMALLEST_REST)).sum()
     }
 
     /// Those of one series of the source in `slot`, `None` for the datum.
@@ -56,20 +66,20 @@ impl Kernel for ResidualsOf<'_> {
         for sample in samples {
             knots.evaluate(reference.time_s(sample.time_s), &mut active);
             let motion = motion(&posterior.coefficients, &active, reference.centre);
-            let row = reference.row(quantity, sample, &motion);
             let left = reference.residual(quantity, sample, &motion);
+            let sigma = reference.sigma(sample);
+            residuals.scaled.push(std::array::from_fn(|axis| left[axis] / sigma[axis]));
+            let row = reference.row(quantity, sample, &motion);
             let b = match quantity {
                 Quantity::Position => active.value(),
                 Quantity::Velocity => active.slope(),
             };
-            let sigma = reference.sigma(sample);
-            let mut leverage = 0.0;
+            let mut leverage = [0.0; 3];
             for axis in 0..3 {
                 let own = slot.map(|slot| (slot, &row.columns[axis]));
                 let variance = posterior.variance(axis, active.first, b, row.gain, own);
-                leverage += variance / (sigma[axis] * sigma[axis]);
+                leverage[axis] = variance / (sigma[axis] * sigma[axis]);
             }
-            residuals.scaled.push(std::array::from_fn(|axis| left[axis] / sigma[axis]));
             residuals.leverage.push(leverage);
         }
         residuals

@@ -76,7 +76,8 @@ fn facing_ends(from: &[Sample], to: &[Sample]) -> Vec<Pair> {
     let end = |series: &[Sample], last: bool| -> Option<[f64; 2]> {
         let n = series.len().min(AT_AN_END);
         let part = if last { &series[series.len() - n..] } else { &series[..n] };
-        let median = |axis: usize| robust::median(&mut part.iter().map(|s| s.value[axis]).collect::<Vec<_>>());
+        let median =
+            |axis: usize| robust::median(&mut part.iter().map(|s| s.value[axis]).collect::<Vec<_>>());
         Some([median(0)?, median(1)?])
     };
     let first = |series: &[Sample]| series.first().map_or(0.0, |s| s.time_s);
@@ -113,7 +114,7 @@ fn turn(pairs: &[Pair], slack: f64) -> Option<(f64, f64)> {
         let typical = robust::median(&mut lengths.clone())?;
         let total: f64 = weights.iter().sum();
         let mean_square = squares / total;
-        if !(mean_square > 0.0) {
+        if mean_square <= 0.0 {
             return None;
         }
         let sigma = ((typical * typical / total + slack * slack) / mean_square).sqrt();

@@ -9,6 +9,7 @@
 //! w_m ~ p(m) p(data | m),   u = sum_m w_m u_m,   C = sum_m w_m (C_m + (u_m - u) (u_m - u)')
 //! ```
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVector};
@@ -26,7 +27,6 @@ const LEVEL_SHARES: [f64; 4] = [f64::NAN, 0.4, 0.5, 0.1];
 /// errors have them all, a calibrated pair has none: small, and what is found makes the rest more likely (Scott,
 /// Berger 2010, Ann. Stat. 38, 2587).
 const SHARE_OF_ERRORS: f64 = 0.25;
-
 
 /// The level that the search begins with.
 const FIRST_LEVEL: u8 = 2;
@@ -104,10 +104,10 @@ impl Models<'_> {
                 for level in 0..LEVELS.len() as u8 {
                     let mut near = model.clone();
                     near[group] = level;
-                    if !weights.contains_key(&near) {
-                        let weight = self.log_weight(&near);
+                    if let Entry::Vacant(place) = weights.entry(near) {
+                        let weight = self.log_weight(place.key());
+                        place.insert(weight);
                         best = best.max(weight);
-                        weights.insert(near, weight);
                     }
                 }
             }
@@ -147,7 +147,6 @@ pub(super) fn average(information: &Information, layout: &Layout, priors: &Prior
     Some(Averaged {
         estimate: Estimate { mean, covariance, log_evidence: best + total.ln() },
         inclusions: inclusions.collect(),
-
     })
 }
 

@@ -13,25 +13,28 @@ use super::normal::Normal;
 use super::unknowns::{Kind, OF_AN_AXIS, index};
 use crate::math::scalar;
 
+/// Decades about the ratio of the traces: beyond, the penalty would leave too few digits to the data.
+const LARGEST: f64 = 8.0;
+
 /// The lambda of greatest restricted likelihood on `axis`, with unknowns of these prior `variances` (one an
-/// acting unknown); looked for about the `last` one, or everywhere.
+/// acting unknown); looked for `about` one, to within so many
+/// decades, or everywhere.
 pub(super) fn likeliest_lambda(
     normal: &Normal,
     penalty: &Penalty,
     layout: &Layout,
     variances: &[f64],
     axis: usize,
-    last: Option<f64>,
+    about: Option<(f64, f64)>,
 ) -> f64 {
     let unit = normal.gram(axis).trace() / penalty.matrix.trace();
     let own = own_unknowns(layout, variances, axis);
-    // beyond 1e8 the penalty would leave too few digits to the data
-    let (low, high, cells) = match last {
-        Some(last) => {
+    let (low, high, cells) = match about {
+        Some((last, decades)) => {
             let middle = (last / unit).log10();
-            (f64::max(middle - 0.7, -8.0), f64::min(middle + 0.7, 8.0), 2)
+            (f64::max(middle - decades, -LARGEST), f64::min(middle + decades, LARGEST), 2)
         }
-        None => (-8.0, 8.0, 8),
+        None => (-LARGEST, LARGEST, 8),
     };
     let found = scalar::minimise(low, high, cells, 0.05, |exponent| {
         let lambda = unit * 10.0_f64.powf(exponent);
