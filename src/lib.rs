@@ -13,6 +13,7 @@
 //! | PCF, one polynomial an axis | [`estimate::polynomial`] | Zhang 2025, eq. 3-6 |
 //! | SFF, Gaussian splines with a jerk penalty | [`estimate::spline`] | Zhang 2025, eq. 7-11 |
 //! | moving average over GDF | [`estimate::moving_average`] | Zhang 2025, Table 1 |
+//! | registration of the sources to a datum | [`estimate::registration`] | ours |
 //! | extrapolation, its band from rolling origins | [`estimate::extrapolation`] | Zhang 2025, sea trial; the band is ours |
 //! | characteristic points | [`estimate::characteristic_point`] | Zhang 2025, eq. 13 |
 //! | lines of a picture, thinned | [`math::polyline`] | Visvalingam & Whyatt 1993 |

@@ -7,6 +7,7 @@ pub mod extrapolation;
 pub mod moving_average;
 pub mod noise;
 pub mod polynomial;
+pub mod registration;
 pub mod spline;
 pub mod weighted_mean;
 

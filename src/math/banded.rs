@@ -244,8 +244,12 @@ impl LogProduct {
 }
 
 impl Cholesky {
-    /// Overwrites the right sides b (n rows, R columns) by `L^-1 b`.
-    fn forward<const R: usize>(&self, b: &mut [[f64; R]]) {
+    /// Overwrites the right sides b (n rows, R columns) by `L^-1 b`, whose products among each other are those
+    /// of `b' A^-1 b`.
+    ///
+    /// # Panics
+    /// When b has fewer rows than the matrix.
+    pub fn forward<const R: usize>(&self, b: &mut [[f64; R]]) {
         let n = self.factor.size;
         for j in 0..n {
             let column = self.factor.row(j);
@@ -281,6 +285,14 @@ impl Cholesky {
                 *x /= column[0];
             }
         }
+    }
+
+    /// The logarithm of A's determinant.
+    #[must_use]
+    pub fn log_determinant(&self) -> f64 {
+        let mut determinant = LogProduct::default();
+        (0..self.factor.size).for_each(|j| determinant.multiply(self.factor.row(j)[0]));
+        2.0 * determinant.ln()
     }
 
     /// The elements of `A^-1` inside the band of A.

@@ -1,0 +1,369 @@
+//! One joint fit: spline and unknowns, noise levels and smoothing, by turns until nothing moves.
+
+use super::bordered::{Layout, Posterior, eliminate};
+use super::knots::{Knots, Penalty};
+use super::model::{Anchor, Reference};
+use super::noise::Level;
+use super::normal::{Normal, Weighted, motion};
+use super::residuals::Residuals;
+use super::selection::{self, Averaged, Inclusion};
+use super::smoothing::likeliest_lambda;
+use super::unknowns::{Kind, OF_A_SOURCE, SourceErrors, index, kind_of};
+use super::{Settings, separation};
+use crate::estimate::spline;
+use crate::math::gaussian_basis::Active;
+use crate::math::robust;
+use crate::sample::{Quantity, Source};
+
+/// Steps with weights that minimise absolute values, before outliers are told from noise.
+const FIRST_STEPS: usize = 4;
+
+/// Steps after which a fit that still moves is left as it is.
+const MOST_STEPS: usize = 40;
+
+/// Steps about the average over the models.
+const LAST_STEPS: usize = 2;
+
+/// A step is small that moves no unknown by more than this many of its sigmas,
+const SMALL_MOVE: f64 = 0.02;
+/// and no noise's variance by more than this share.
+const SMALL_CHANGE: f64 = 0.01;
+
+/// Knots beyond both ends of a piece for samples that a clock offset moves there, in sigmas of the prior.
+const PAD_SIGMAS: f64 = 8.0;
+
+/// A clock offset that comes near the last of these knots begins anew with four times as many, so often at most.
+const MOST_WIDENINGS: usize = 3;
+
+/// No finer by default, s: velocity bands want a thrust's onset in 0.3 s to be followed.
+const FINEST_SPACING_S: f64 = 0.04;
+
+/// Decades about the last lambda that the next one is looked for in, at most.
+const WIDEST_SEARCH: f64 = 0.7;
+
+/// What is being fitted, and how far it is.
+pub(super) struct Fit<'a> {
+    pub(super) sources: &'a [Source],
+    pub(super) settings: &'a Settings,
+    pub(super) knots: Knots,
+    penalty: Penalty,
+    pub(super) references: Vec<Reference>,
+    /// Whether the source's rotation is looked for.
+    rotated: Vec<bool>,
+    pub(super) layout: Layout,
+    pub(super) levels: Vec<[Level; 2]>,
+    /// Robust weights by source, quantity and sample.
+    pub(super) weights: Vec<[Vec<f64>; 2]>,
+    pub(super) lambda: [f64; 3],
+    /// How far about the last lambda the next one is looked for, decades.
+    search_decades: [f64; 3],
+    relaxations: Vec<Relaxation>,
+    pub(super) posterior: Option<Posterior>,
+    pub(super) inclusions: Vec<Inclusion>,
+    pub(super) separations: Vec<(Option<(separation::Name, f64)>, separation::Separation)>,
+    pub(super) log_evidence: f64,
+    pub(super) iterations: usize,
+    pub(super) converged: bool,
+}
+
+/// Which way of weighing samples.
+#[derive(Clone, Copy, PartialEq)]
+enum Stage {
+    /// By absolute values.
+    First,
+    /// By a mixture of scales.
+    Mixture,
+}
+
+/// Which unknowns are thought to be there.
+#[derive(Clone, Copy, PartialEq)]
+enum Choice {
+    /// All.
+    All,
+    /// Those that the evidence asks for.
+    ByEvidence,
+}
+
+impl<'a> Fit<'a> {
+    /// Fits all `sources`, those with an angle turned by about that much against the datum. `None` where the data
+    /// leave the curve open.
+    pub(super) fn run(
+        sources: &'a [Source],
+        datum: usize,
+        pieces: &[(f64, f64)],
+        rotations: &[Option<f64>],
+        settings: &'a Settings,
+    ) -> Option<Self> {
+        let mut pad_s = PAD_SIGMAS * settings.priors.clock_offset_s;
+        let mut fit = Self::once(Self::start(sources, datum, pieces, rotations, settings, pad_s))?;
+        for _ in 0..MOST_WIDENINGS {
+            let latest = fit.references.iter().map(|r| r.errors.clock_offset_s.abs()).fold(0.0, f64::max);
+            if latest < 0.8 * pad_s {
+                break;
+            }
+            pad_s *= 4.0;
+            fit = Self::once(Self::start(sources, datum, pieces, rotations, settings, pad_s))?;
+        }
+        Some(fit)
+    }
+
+    /// All steps from the start to the end.
+    fn once(mut fit: Self) -> Option<Self> {
+        let settings = fit.settings;
+        for step in 0..MOST_STEPS {
+            let before = (fit.posterior.as_ref().map(|p| p.unknowns.clone()), fit.levels.clone());
+            fit.solve(Choice::All)?;
+            if step == 0 {
+                fit.put_anchors_on_curve();
+            }
+            let first = settings.robust && step < FIRST_STEPS;
+            fit.reweigh(if first { Stage::First } else { Stage::Mixture });
+            fit.iterations = step + 1;
+            fit.converged = step > FIRST_STEPS + 1 && fit.is_settled(before.0.as_deref(), &before.1);
+            if fit.converged {
+                break;
+            }
+        }
+        if settings.select {
+            for _ in 0..LAST_STEPS {
+                fit.solve(Choice::ByEvidence)?;
+                fit.reweigh(Stage::Mixture);
+            }
+        }
+        fit.solve(if settings.select { Choice::ByEvidence } else { Choice::All })?;
+        Some(fit)
+    }
+
+    fn start(
+        sources: &'a [Source],
+        datum: usize,
+        pieces: &[(f64, f64)],
+        rotations: &[Option<f64>],
+        settings: &'a Settings,
+        pad_s: f64,
+    ) -> Self {
+        let spacing_s = settings.knot_spacing_s.unwrap_or_else(|| spacing_s(sources, pieces));
+        let knots = Knots::covering(pieces, spacing_s, pad_s);
+        let centre = middle(sources);
+        let reference = |i: usize| Reference {
+            anchor: Anchor { time_s: common_s(&sources[i], &sources[datum]), point_m: centre },
+            errors: SourceErrors { rotation_rad: rotations[i].unwrap_or(0.0), ..SourceErrors::default() },
+            is_datum: i == datum,
+            centre,
+        };
+        let slots: Vec<usize> = (0..sources.len()).filter(|&i| i != datum).collect();
+        Self {
+            sources,
+            settings,
+            penalty: knots.jerk_penalty(),
+            knots,
+            references: (0..sources.len()).map(reference).collect(),
+            rotated: rotations.iter().map(Option::is_some).collect(),
+            levels: vec![[Level::default(); 2]; sources.len()],
+            weights: sources.iter().map(|s| Quantity::ALL.map(|q| vec![1.0; s.series(q).len()])).collect(),
+            lambda: [1.0; 3],
+            search_decades: [WIDEST_SEARCH; 3],
+            relaxations: vec![Relaxation::default(); slots.len()],
+            layout: Layout { slots, active: Vec::new() },
+            posterior: None,
+            inclusions: Vec::new(),
+            separations: Vec::new(),
+            log_evidence: 0.0,
+            iterations: 0,
+            converged: false,
+        }
+    }
+
+    /// The unknowns that can act: not those of a quantity that isn't measured, and, while there is no curve, not
+    /// those that its motion multiplies.
+    fn acting(&self) -> Vec<usize> {
+        let mut active = Vec::new();
+        for (slot, &source) in self.layout.slots.iter().enumerate() {
+            let measures = Quantity::ALL.map(|q| !self.sources[source].series(q).is_empty());
+            for own in 0..OF_A_SOURCE {
+                let (kind, axis) = kind_of(own);
+                let acts = match kind {
+                    Kind::Bias | Kind::Drift => measures[0],
+                    Kind::VelocityBias => measures[1],
+                    Kind::ClockOffset | Kind::Scale => self.posterior.is_some(),
+                    Kind::Rotation => self.rotated[source] && self.posterior.is_some(),
+                };
+                if acts && self.settings.kinds.contains(&kind) {
+                    active.push(index(slot, kind, axis));
+                }
+            }
+        }
+        active
+    }
+
+    fn solve(&mut self, choice: Choice) -> Option<()> {
+        self.layout.active = self.acting();
+        let normal = self.normal();
+        let priors = &self.settings.priors;
+        let variances: Vec<f64> =
+            self.layout.active.iter().map(|&i| priors.of(kind_of(i).0).powi(2)).collect();
+        for axis in 0..3 {
+            // everywhere at first, and again when outliers are told from noise
+            let anew = self.iterations == 0 || (FIRST_STEPS..FIRST_STEPS + 3).contains(&self.iterations);
+            let last = self.lambda[axis];
+            let about = (!anew).then_some((last, self.search_decades[axis]));
+            let lambda = likeliest_lambda(&normal, &self.penalty, &self.layout, &variances, axis, about);
+            let moved = (lambda / last).log10().abs();
+            self.search_decades[axis] =
+                if anew { WIDEST_SEARCH } else { (2.0 * moved).clamp(0.1, WIDEST_SEARCH) };
+            self.lambda[axis] = lambda;
+        }
+        let eliminated = eliminate(&normal, &self.penalty, self.lambda, &self.layout)?;
+        let information = &eliminated.information;
+        let estimate = match choice {
+            Choice::All => information.with_prior(&variances)?,
+            Choice::ByEvidence => {
+                let Averaged { estimate, inclusions } =
+                    selection::average(information, &self.layout, priors)?;
+                self.inclusions = inclusions;
+                estimate
+            }
+        };
+        self.separations = separation::separations(information, &self.layout, priors);
+        self.log_evidence = estimate.log_evidence - 0.5 * eliminated.deviance_at_zero;
+        self.take(eliminated.posterior(&self.layout, &estimate));
+        Some(())
+    }
+
+    fn normal(&self) -> Normal {
+        let weights: Vec<[Vec<f64>; 2]> = self
+            .weights
+            .iter()
+            .zip(&self.levels)
+            .map(|(weights, levels)| {
+                let total = |q: usize| weights[q].iter().map(|w| w * levels[q].precision()).collect();
+                [total(0), total(1)]
+            })
+            .collect();
+        let series: Vec<Weighted<'_>> = (0..self.sources.len())
+            .flat_map(|source| Quantity::ALL.map(|quantity| (source, quantity)))
+            .map(|(source, quantity)| Weighted {
+                source,
+                quantity,
+                samples: self.sources[source].series(quantity),
+                weights: &weights[source][quantity as usize],
+            })
+            .collect();
+        let none = vec![[0.0; 3]; self.knots.count()];
+        let coefficients = self.posterior.as_ref().map_or(&none, |p| &p.coefficients);
+        Normal::of(&self.knots, &series, &self.references, coefficients)
+    }
+
+    /// Goes to a new solution, clock offsets by a part of the way where they would swing.
+    fn take(&mut self, posterior: Posterior) {
+        for (slot, &source) in self.layout.slots.iter().enumerate() {
+            let before = self.references[source].errors;
+            let mut errors = SourceErrors::of(&posterior.unknowns, slot);
+            let step = errors.clock_offset_s - before.clock_offset_s;
+            errors.clock_offset_s = before.clock_offset_s + self.relaxations[slot].shorten(step);
+            if !self.layout.active.contains(&index(slot, Kind::Rotation, 0)) {
+                errors.rotation_rad = before.rotation_rad;
+            }
+            self.references[source].errors = errors;
+        }
+        self.posterior = Some(posterior);
+    }
+
+    fn put_anchors_on_curve(&mut self) {
+        let Some(posterior) = &self.posterior else { return };
+        for reference in &mut self.references {
+            let mut active = Active::default();
+            self.knots.evaluate(reference.anchor.time_s, &mut active);
+            reference.anchor.point_m = motion(&posterior.coefficients, &active, reference.centre)[0];
+        }
+    }
+
+    /// What the current solution leaves of one series.
+    pub(super) fn residuals(&self, posterior: &Posterior, source: usize, quantity: Quantity) -> Residuals {
+        let slot = self.layout.slots.iter().position(|&s| s == source);
+        let samples = self.sources[source].series(quantity);
+        let reference = &self.references[source];
+        Residuals::of(&self.knots, posterior, reference, slot, quantity, samples)
+    }
+
+    fn reweigh(&mut self, stage: Stage) {
+        let Some(posterior) = self.posterior.take() else { return };
+        for source in 0..self.sources.len() {
+            for quantity in Quantity::ALL {
+                let residuals = self.residuals(&posterior, source, quantity);
+                let level = &mut self.levels[source][quantity as usize];
+                let weights = &mut self.weights[source][quantity as usize];
+                match stage {
+                    Stage::First => level.first_weights(&residuals, weights),
+                    Stage::Mixture => {
+                        level.step(&residuals, weights, self.settings.robust);
+                        level.correlate(&residuals, weights);
+                    }
+                }
+            }
+        }
+        self.posterior = Some(posterior);
+    }
+
+    fn is_settled(&self, before: Option<&[f64]>, levels: &[[Level; 2]]) -> bool {
+        let (Some(before), Some(posterior)) = (before, &self.posterior) else { return false };
+        let still = |i: usize| {
+            let sigma = posterior.covariance[(i, i)].sqrt();
+            (posterior.unknowns[i] - before[i]).abs() <= SMALL_MOVE * sigma
+        };
+        let calm = |(a, b): (&Level, &Level)| (a.precision() / b.precision()).ln().abs() < SMALL_CHANGE;
+        self.levels.iter().flatten().zip(levels.iter().flatten()).all(calm) && (0..before.len()).all(still)
+    }
+}
+
+/// Shortens steps that swing to and fro (Aitken's relaxation): a clock offset that rests on a gap moves half the
+/// track, and Gauss-Newton overshoots.
+#[derive(Clone, Copy, Debug)]
+struct Relaxation {
+    share: f64,
+    last: f64,
+}
+
+impl Default for Relaxation {
+    fn default() -> Self {
+        Self { share: 1.0, last: 0.0 }
+    }
+}
+
+impl Relaxation {
+    const SHORTEST: f64 = 0.25;
+
+    fn shorten(&mut self, step: f64) -> f64 {
+        let difference = self.last - step;
+        self.share = if self.last == 0.0 || difference == 0.0 {
+            1.0
+        } else {
+            (self.share * self.last / difference).clamp(Self::SHORTEST, 1.0)
+        };
+        self.last = step;
+        self.share * step
+    }
+}
+
+/// The fastest source's median interval, but no finer than 0.04 s, and no more knots than the spline's.
+fn spacing_s(sources: &[Source], pieces: &[(f64, f64)]) -> f64 {
+    let seen_s: f64 = pieces.iter().map(|p| p.1 - p.0).sum();
+    let fastest = sources.iter().filter_map(crate::estimate::coverage::median_interval_s);
+    let wanted = fastest.fold(f64::INFINITY, f64::min);
+    let wanted = if wanted.is_finite() { wanted.max(FINEST_SPACING_S) } else { FINEST_SPACING_S };
+    wanted.max(spline::finest_affordable_s(sources, 0.0, seen_s))
+}
+
+/// The medians of the positions: coefficients about it are small, and so are rounding and ripple.
+fn middle(sources: &[Source]) -> [f64; 3] {
+    std::array::from_fn(|axis| {
+        let mut values: Vec<f64> = sources.iter().flat_map(|s| &s.positions).map(|p| p.value[axis]).collect();
+        robust::median(&mut values).unwrap_or(0.0)
+    })
+}
+
+/// The middle of the overlap, or of the gap, of two sources.
+fn common_s(a: &Source, b: &Source) -> f64 {
+    let (Some(a), Some(b)) = (a.span_s(), b.span_s()) else { return 0.0 };
+    a.0.max(b.0).midpoint(a.1.min(b.1))
+}
