@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use crate::config::{self, Config, ExtrapolationMethod, Registration};
 use crate::estimate::characteristic_point::Height;
 use crate::estimate::coverage;
+use crate::estimate::registration::{self, Kind};
 use crate::estimate::extrapolation::{self, Law, LawKind};
 use crate::fusion::{self, Fusion, Plan};
 use crate::log::Log;
@@ -75,7 +76,16 @@ pub fn plan(
     output.rate_hz = Some(rate_hz);
     let frame_id = output.frame_id.get_or_insert_with(|| loaded[datum].frame_id.clone()).clone();
     output.surface_at_zero.get_or_insert_with(|| surface_at_zero(sources));
-    fuse.estimate = Registration::List(Vec::new()); // all that can be estimated today
+    let kinds = match &fuse.estimate {
+        Registration::Auto(_) => Kind::ALL.to_vec(),
+        Registration::List(kinds) => kinds.clone(),
+    };
+    let registration = (!kinds.is_empty()).then(|| registration::Settings {
+        kinds,
+        priors: config.registration,
+        knot_spacing_s: fuse.knot_spacing_s,
+        ..registration::Settings::default()
+    });
     Ok(Plan {
         origin,
         frame_id,
@@ -87,6 +97,7 @@ pub fn plan(
         order: fuse.order,
         window_points: fuse.window_points,
         bridge_max_s: fuse.bridge_max_s,
+        registration,
         extrapolation: (beyond.horizon_s > 0.0)
             .then(|| extrapolation::Settings { laws: laws(beyond, sources), horizon_s: beyond.horizon_s }),
         stop_z_m: beyond.stop_z_m,

@@ -1,6 +1,7 @@
 //! Every value of a config held to its range.
 
-use super::{Config, ConfigError, Registration};
+use super::{Config, ConfigError};
+use crate::estimate::registration::Kind;
 
 impl Config {
     /// Checks every value's range.
@@ -44,11 +45,11 @@ impl Config {
             fusion.window_points.to_string(),
             "1 to 100000",
         )?;
-        let list = match &fusion.estimate {
-            Registration::List(list) => list.join(", "),
-            Registration::Auto(_) => String::new(),
-        };
-        range(list.is_empty(), "fusion.estimate".into(), format!("[{list}]"), "\"auto\" or []")?;
+        let priors = &self.registration;
+        for kind in Kind::ALL {
+            let key = format!("registration's {}", kind.name());
+            positive(&key, Some(priors.of(kind)))?;
+        }
         let horizon_ok = (0.0..=3600.0).contains(&beyond.horizon_s);
         range(horizon_ok, "extrapolation.horizon_s".into(), beyond.horizon_s.to_string(), "0 to 3600 s")?;
         positive("extrapolation.window_s", beyond.window_s)?;

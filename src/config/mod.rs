@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::estimate::registration::{Kind, Priors};
 use crate::estimate::{Coefficients, Estimator};
 use crate::log::Compression;
 
@@ -73,6 +74,8 @@ pub struct Config {
     pub source: Vec<SourceConfig>,
     /// How they are fused.
     pub fusion: Fusion,
+    /// Standard deviations of the sources' errors before anything is known.
+    pub registration: Priors,
     /// How the track is carried on behind the last sample.
     pub extrapolation: Extrapolation,
     /// Heights whose first upward crossing is reported.
@@ -235,8 +238,8 @@ impl Default for Fusion {
 pub enum Registration {
     /// All that the program can.
     Auto(Auto),
-    /// A list of quantities; today only the empty one.
-    List(Vec<String>),
+    /// These kinds of errors; none for no registration.
+    List(Vec<Kind>),
 }
 
 /// The word "auto".
@@ -339,7 +342,8 @@ impl Config {
 /// The parser's message without the words of its trade.
 fn plain_words(message: &str) -> String {
     if message.contains("untagged enum Registration") {
-        return "expected \"auto\" or []".into();
+        let kinds: Vec<_> = Kind::ALL.map(Kind::key).map(|key| format!("{key:?}")).to_vec();
+        return format!("expected \"auto\", [], or a list of {}", kinds.join(", "));
     }
     let words = [
         ("invalid type: map, expected a sequence", "found one table, expected a list of tables"),

@@ -1,14 +1,40 @@
-//! How sure a track is of itself while its sources are not registered to each other.
+//! How sure a track is of itself beyond what its curve knows.
 
 use super::Plan;
 use super::pieces::Piece;
+use super::registered::widened;
 use crate::estimate::agreement::{self, Disagreement};
 use crate::estimate::coverage::Coverage;
+use crate::estimate::registration::Registered;
 use crate::sample::{Quantity, Source};
-use crate::track::State;
+use crate::track::{Phase, State};
 
-/// What the bands hold beside a curve's own sigma: what the sources, not being registered, may differ by.
-pub(super) struct Bands {
+/// What the bands hold beside a curve's own sigma.
+pub(super) enum Bands<'a> {
+    /// What the registration leaves open, which only the registered spline itself knows of.
+    Registered {
+        /// The registration.
+        registered: &'a Registered,
+        /// Whether its spline is the track.
+        is_track: bool,
+    },
+    /// What the sources may differ by.
+    Unregistered(Unregistered),
+}
+
+impl Bands<'_> {
+    /// The state with the sigmas that it deserves; NaN for those that nobody knows.
+    pub(super) fn widen(&self, state: State, time_s: f64, seen_by: u32, phase: Phase) -> State {
+        match self {
+            Self::Unregistered(bands) => bands.widen(state, time_s, seen_by),
+            Self::Registered { is_track: true, .. } if phase != Phase::Extrapolated => state,
+            Self::Registered { registered, .. } => widened(state, time_s, registered),
+        }
+    }
+}
+
+/// What sources that aren't registered to each other may differ by.
+pub(super) struct Unregistered {
     /// In position, m, and velocity, m/s, by axis.
     systematic: [[f64; 3]; 2],
     /// Whether they differ by so much that they pull the curve away from the datum even where it sees alone.
@@ -21,7 +47,7 @@ pub(super) struct Bands {
     datum_runs: Vec<(f64, f64)>,
 }
 
-impl Bands {
+impl Unregistered {
     pub(super) fn of(
         sources: &[Source],
         coverage: &Coverage,
@@ -39,8 +65,7 @@ impl Bands {
         }
     }
 
-    /// The state with the sigmas that it deserves; NaN for those that nobody knows.
-    pub(super) fn widen(&self, mut state: State, time_s: f64, seen_by: u32) -> State {
+    fn widen(&self, mut state: State, time_s: f64, seen_by: u32) -> State {
         let [position, velocity] = self.systematic;
         // away from the datum, velocities that differ make positions drift apart
         let away = |run: &(f64, f64)| (run.0 - time_s).max(time_s - run.1).max(0.0);

@@ -1,22 +1,27 @@
 //! The main job on samples: sources in, one track out, with everything that a report says of it.
 //!
 //! 1. Who sees what when ([`coverage`]); a silence longer than `bridge_max_s` cuts the log into pieces.
-//! 2. Each piece is fitted by the method that was asked for.
-//! 3. Where sources overlap they are held against each other ([`agreement`]); while they aren't
+//! 2. Sources are registered to the datum ([`registration`]); what follows sees them without their errors. Each piece is fitted by the method that was asked for.
+//! 3. Where sources overlap they are held against each other ([`agreement`]); where they weren't
 //!    registered, what they differ by widens the bands.
 //! 4. The last piece is carried on ([`extrapolation`]), and once more the paper's plain way.
 //! 5. Characteristic points are looked up on the track.
 
 mod bands;
 mod pieces;
+mod registered;
 
-use bands::{Bands, warn_of_disagreement, warn_of_misfit};
+use std::sync::Arc;
+
+use bands::{Bands, Unregistered, warn_of_disagreement, warn_of_misfit};
 use pieces::{Piece, fit_pieces};
+use registered::register_pieces;
 
 use crate::estimate::agreement::{self, Disagreement};
 use crate::estimate::characteristic_point::{self, CharacteristicPoint, Height};
 use crate::estimate::coverage::{self, Coverage};
 use crate::estimate::extrapolation::{self, Extrapolation, Holdout, Law, LawKind};
+use crate::estimate::registration::{self, Registered};
 use crate::estimate::{self, EstimateError};
 use crate::estimate::{Coefficients, Estimator};
 use crate::quality::{self, PhaseSummary, Residual};
@@ -45,6 +50,8 @@ pub struct Plan {
     pub order: usize,
     /// Moving average: points.
     pub window_points: usize,
+    /// What is registered between sources; `None` for nothing.
+    pub registration: Option<registration::Settings>,
     /// The longest silence of all sources that is bridged, s.
     pub bridge_max_s: f64,
     /// How to carry the track on; `None` for not at all.
@@ -53,6 +60,14 @@ pub struct Plan {
     pub stop_z_m: Option<f64>,
     /// Characteristic points to look for.
     pub heights: Vec<Height>,
+}
+
+impl Plan {
+    /// Whether the spline that the sources are registered with is the track.
+    fn is_registered_spline(&self) -> bool {
+        let shared = self.coefficients == Coefficients::Shared;
+        self.method == Estimator::Sff && shared && self.registration.is_some()
+    }
 }
 
 /// What SFF chose.
@@ -67,7 +82,7 @@ pub struct SplineSummary {
 }
 
 /// The track and what is to be said of it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Fusion {
     /// The fused track with its extrapolation.
     pub track: Track,
@@ -83,7 +98,9 @@ pub struct Fusion {
     pub residuals: Vec<Residual>,
     /// The track phase by phase.
     pub phases: Vec<PhaseSummary>,
-    /// How the sources differ where they overlap.
+    /// The sources' errors, where they were registered.
+    pub registered: Option<Registered>,
+    /// How the sources differ where they overlap: what is left after the registration, if there was one.
     pub disagreements: Vec<Disagreement>,
     /// What SFF chose, where SFF it was.
     pub spline: Option<SplineSummary>,
@@ -112,14 +129,35 @@ const PLAIN_PCF: (usize, usize) = (4, 46);
 /// [`EstimateError::BadNumber`] as [`estimate::check`]; that of the first piece when no piece can be fitted.
 pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
     estimate::check(sources)?;
-    let coverage = Coverage::of(sources);
     let mut warnings = Vec::new();
-    let pieces = fit_pieces(sources, &coverage, plan, &mut warnings)?;
+    let mut registered = None;
+    let corrected;
+    let mut sources = sources;
+    if let Some(settings) = &plan.registration {
+        let (kept, found) = register_pieces(sources, plan, settings)?;
+        corrected = found.corrected(&kept);
+        sources = &corrected;
+        registered = Some(found);
+    }
+    let coverage = Coverage::of(sources);
+    let curve = registered.as_mut().map(|r| {
+        r.curve = r.curve.clone().over(&coverage.pieces(plan.bridge_max_s));
+        Arc::new(r.curve.clone())
+    });
+    let pieces = fit_pieces(sources, &coverage, plan, curve.as_ref(), &mut warnings)?;
 
     let disagreements = agreement::compare(sources, &coverage);
-    let bands = Bands::of(sources, &coverage, &disagreements, plan);
-    warn_of_disagreement(sources, &disagreements, &mut warnings);
-    warn_of_misfit(&pieces, &disagreements, &mut warnings);
+    let bands = match &registered {
+        Some(registered) => {
+            registered::warn(sources, registered, &disagreements, &mut warnings);
+            Bands::Registered { registered, is_track: plan.is_registered_spline() }
+        }
+        None => {
+            warn_of_disagreement(sources, &disagreements, &mut warnings);
+            warn_of_misfit(&pieces, &disagreements, &mut warnings);
+            Bands::Unregistered(Unregistered::of(sources, &coverage, &disagreements, plan))
+        }
+    };
 
     let mut points = Vec::new();
     let mut last_s = 0.0;
@@ -187,6 +225,7 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
         spline: pieces.last().and_then(|p| p.spline),
         pieces: pieces.iter().map(|p| (p.from_s, p.to_s)).collect(),
         coverage,
+        registered,
         disagreements,
         laws,
         warnings,
@@ -194,12 +233,12 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
 }
 
 /// The points of a piece between its first and last sample.
-fn observed(piece: &Piece, coverage: &Coverage, bands: &Bands, plan: &Plan) -> Vec<TrackPoint> {
+fn observed(piece: &Piece, coverage: &Coverage, bands: &Bands<'_>, plan: &Plan) -> Vec<TrackPoint> {
     let point = |time_s| {
         let seen_by = coverage.seen_by(time_s);
         Some(TrackPoint {
             time: plan.origin.plus_seconds(time_s),
-            state: bands.widen(piece.curve.at(time_s)?, time_s, seen_by),
+            state: bands.widen(piece.curve.at(time_s)?, time_s, seen_by, Coverage::phase(seen_by)),
             phase: Coverage::phase(seen_by),
             method: plan.method.method(),
             seen_by,
@@ -217,13 +256,13 @@ fn carry_on(
     piece: &Piece,
     horizon_s: f64,
     start_s: f64,
-    bands: &Bands,
+    bands: &Bands<'_>,
     plan: &Plan,
 ) -> Vec<TrackPoint> {
     let point = |time_s| {
         Some(TrackPoint {
             time: plan.origin.plus_seconds(time_s),
-            state: bands.widen(made.at(time_s)?, time_s, 0),
+            state: bands.widen(made.at(time_s)?, time_s, 0, Phase::Extrapolated),
             phase: Phase::Extrapolated,
             method: made.law.kind.method(),
             seen_by: 0,

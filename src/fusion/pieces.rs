@@ -1,14 +1,17 @@
 //! The pieces that long silences cut a log into, each fitted by the method that was asked for.
 
+use std::sync::Arc;
+
 use super::{Plan, SplineSummary, grid};
 use crate::estimate::EstimateError;
 use crate::estimate::Estimator;
 use crate::estimate::coverage::Coverage;
 use crate::estimate::moving_average::MovingAverage;
+use crate::estimate::registration::RegisteredCurve;
 use crate::estimate::weighted_mean::WeightedMean;
 use crate::estimate::{polynomial, spline};
 use crate::sample::{Quantity, Source};
-use crate::track::Curve;
+use crate::track::{Curve, State};
 
 /// A fitted piece.
 pub(super) struct Piece {
@@ -24,13 +27,14 @@ pub(super) fn fit_pieces(
     sources: &[Source],
     coverage: &Coverage,
     plan: &Plan,
+    registered: Option<&Arc<RegisteredCurve>>,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Piece>, EstimateError> {
     let (mut fitted, mut first_error) = (Vec::new(), None);
     let (mut lost_samples, mut lost_at) = (0, None);
     for (from_s, to_s) in coverage.pieces(plan.bridge_max_s) {
         let inside: Vec<Source> = sources.iter().map(|s| s.within(from_s, to_s)).collect();
-        match fit(&inside, from_s, to_s, plan) {
+        match fit(&inside, from_s, to_s, plan, registered) {
             Ok((curve, spline)) => fitted.push(Piece { from_s, to_s, sources: inside, curve, spline }),
             Err(error) => {
                 lost_samples += inside.iter().map(Source::len).sum::<usize>();
@@ -69,11 +73,29 @@ pub(super) fn fit_pieces(
 
 type Fitted = (Box<dyn Curve>, Option<SplineSummary>);
 
-fn fit(sources: &[Source], from_s: f64, to_s: f64, plan: &Plan) -> Result<Fitted, EstimateError> {
+/// A curve that pieces share.
+struct Shared(Arc<RegisteredCurve>);
+
+impl Curve for Shared {
+    fn at(&self, time_s: f64) -> Option<State> {
+        self.0.at(time_s)
+    }
+}
+
+fn fit(
+    sources: &[Source],
+    from_s: f64,
+    to_s: f64,
+    plan: &Plan,
+    registered: Option<&Arc<RegisteredCurve>>,
+) -> Result<Fitted, EstimateError> {
     let got = instants(sources);
     if got < spline::MIN_SAMPLES {
         let what = plan.method.method().name().to_owned();
         return Err(EstimateError::TooFewSamples { what, needed: spline::MIN_SAMPLES, got });
+    }
+    if let (true, Some(curve)) = (plan.is_registered_spline(), registered) {
+        return Ok((Box::new(Shared(Arc::clone(curve))), None));
     }
     match plan.method {
         Estimator::Sff => {
@@ -105,7 +127,7 @@ fn fit(sources: &[Source], from_s: f64, to_s: f64, plan: &Plan) -> Result<Fitted
 }
 
 /// Number of different sampling instants, counted up to [`spline::MIN_SAMPLES`] of each series.
-fn instants(sources: &[Source]) -> usize {
+pub(super) fn instants(sources: &[Source]) -> usize {
     let mut times: Vec<f64> = Vec::new();
     for series in sources.iter().flat_map(|s| Quantity::ALL.map(|q| s.series(q))) {
         let mut own: Vec<f64> = Vec::new();

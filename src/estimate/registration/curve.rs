@@ -16,6 +16,22 @@ pub struct RegisteredCurve {
     pub(super) pieces: Vec<(f64, f64)>,
 }
 
+impl RegisteredCurve {
+    /// The curve over these pieces, from and to in s, in order: those of the samples at their true times.
+    #[must_use]
+    pub fn over(mut self, pieces: &[(f64, f64)]) -> Self {
+        self.pieces = pieces.to_vec();
+        self
+    }
+
+    /// The instant nearest to `time_s` that it covers, and how far that is away, s.
+    #[must_use]
+    pub fn nearest(&self, time_s: f64) -> (f64, f64) {
+        let near = self.pieces.iter().map(|p| time_s.clamp(p.0, p.1)).map(|t| (t, (time_s - t).abs()));
+        near.reduce(|a, b| if b.1 < a.1 { b } else { a }).unwrap_or((time_s, 0.0))
+    }
+}
+
 impl Curve for RegisteredCurve {
     fn at(&self, time_s: f64) -> Option<State> {
         let inside = self.pieces.iter().any(|p| (p.0..=p.1).contains(&time_s));

@@ -37,6 +37,7 @@
 //! band.
 
 mod bordered;
+mod correction;
 mod curve;
 mod fit;
 mod knots;

@@ -1,5 +1,8 @@
 //! The systematic errors of one source, and their places among the unknowns beside the spline.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 /// What a source's samples are off by, against the datum. All zero for the datum itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SourceErrors {
@@ -18,7 +21,8 @@ pub struct SourceErrors {
 }
 
 /// What kind of error an unknown is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Kind {
     /// Of the position, m.
     Bias,
@@ -49,6 +53,16 @@ impl Kind {
             Self::ClockOffset => "clock offset",
             Self::Scale => "scale",
             Self::Rotation => "rotation",
+        }
+    }
+
+    /// Its name in configs.
+    #[must_use]
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::VelocityBias => "velocity-bias",
+            Self::ClockOffset => "clock-offset",
+            _ => self.name(),
         }
     }
 
@@ -119,7 +133,8 @@ impl SourceErrors {
 }
 
 /// Standard deviations of the errors before anything is known: normal, of zero mean.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
 pub struct Priors {
     /// Of the bias, m an axis.
     pub bias_m: f64,

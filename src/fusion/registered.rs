@@ -1,0 +1,104 @@
+//! Sources registered to the datum, and what a person must read of it.
+
+use super::Plan;
+use super::pieces::instants;
+use crate::estimate::agreement::Disagreement;
+use crate::estimate::coverage::Coverage;
+use crate::estimate::registration::{Kind, Registered, Separation, Settings, register};
+use crate::estimate::{EstimateError, spline};
+use crate::sample::{Quantity, Source};
+use crate::track::{Curve, State};
+
+/// Registers what can be fitted of `sources`: the samples of the pieces that have enough of them.
+pub(super) fn register_pieces(
+    sources: &[Source],
+    plan: &Plan,
+    settings: &Settings,
+) -> Result<(Vec<Source>, Registered), EstimateError> {
+    let (mut kept, mut pieces): (Vec<Source>, Vec<(f64, f64)>) =
+        (sources.iter().map(|s| Source { name: s.name.clone(), ..Source::default() }).collect(), Vec::new());
+    for (from_s, to_s) in Coverage::of(sources).pieces(plan.bridge_max_s) {
+        let inside: Vec<Source> = sources.iter().map(|s| s.within(from_s, to_s)).collect();
+        if instants(&inside) >= spline::MIN_SAMPLES && inside.iter().any(|s| !s.positions.is_empty()) {
+            pieces.push((from_s, to_s));
+            for (all, part) in kept.iter_mut().zip(inside) {
+                all.positions.extend(part.positions);
+                all.velocities.extend(part.velocities);
+            }
+        }
+    }
+    let registered = register(&kept, plan.datum, &pieces, settings)?;
+    Ok((kept, registered))
+}
+
+/// A state whose curve doesn't know what the registration leaves open: that of the registered curve at the nearest
+/// instant that was seen is put to it, growing with its velocity's.
+pub(super) fn widened(mut state: State, time_s: f64, registered: &Registered) -> State {
+    let (near_s, away_s) = registered.curve.nearest(time_s);
+    if let Some(known) = registered.curve.at(near_s) {
+        for axis in 0..3 {
+            let (p, v) = (known.position_sigma[axis], known.velocity_sigma[axis]);
+            state.position_sigma[axis] = state.position_sigma[axis].hypot(p + v * away_s);
+            state.velocity_sigma[axis] = state.velocity_sigma[axis].hypot(v);
+        }
+    }
+    state
+}
+
+/// An unknown that keeps more than this share of its prior sigma, and can't be told from another, is worth a warning.
+const UNKNOWN: f64 = 0.5;
+
+/// Warns of what the registration can't tell, and of what it leaves.
+pub(super) fn warn(
+    sources: &[Source],
+    registered: &Registered,
+    left: &[Disagreement],
+    warnings: &mut Vec<String>,
+) {
+    if !registered.converged {
+        warnings.push(format!(
+            "the registration has not converged in {} steps: look at its numbers before you use them",
+            registered.iterations
+        ));
+    }
+    for (s, source) in sources.iter().enumerate() {
+        let vague = |kind: Kind| {
+            registered.unknowns.iter().any(|u| {
+                (u.name.source, u.name.kind) == (s, kind)
+                    && u.separation != Separation::Separate
+                    && u.sigma > UNKNOWN * u.prior_sigma
+            })
+        };
+        let kinds = [Kind::Bias, Kind::ClockOffset].into_iter().filter(|kind| vague(*kind)).map(Kind::name);
+        let kinds: Vec<&str> = kinds.collect();
+        if !kinds.is_empty() {
+            warnings.push(format!(
+                "the data can't tell the {} of {}: an overlap with the datum in which the speed changes would; the \
+                 bands hold what that leaves open",
+                kinds.join(" and the "),
+                source.name
+            ));
+        }
+        for quantity in Quantity::ALL {
+            let of = |r: &&crate::estimate::registration::Rejected| (r.source, r.quantity) == (s, quantity);
+            let (count, all) = (registered.rejected.iter().filter(of).count(), source.series(quantity).len());
+            if 10 * count > all {
+                warnings.push(format!(
+                    "{count} of {all} samples of {}'s {} are rejected as outliers",
+                    source.name,
+                    quantity.name()
+                ));
+            }
+        }
+    }
+    for d in left.iter().filter(|d| d.is_significant()) {
+        let (first, second) = (&sources[d.sources.0].name, &sources[d.sources.1].name);
+        let [x, y, z] = d.median;
+        warnings.push(format!(
+            "{second} and {first} still disagree in {} after registration: {second} - {first} = ({x:+.3}, {y:+.3}, \
+             {z:+.3}) {}; an error that the model doesn't hold",
+            d.quantity.name(),
+            d.quantity.unit()
+        ));
+    }
+}
