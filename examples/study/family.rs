@@ -2,7 +2,7 @@
 
 use std::thread;
 
-use trackfuse::config::{CharacteristicPoint, Config};
+use trackfuse::config::{Auto, CharacteristicPoint, Config, Registration};
 use trackfuse::estimate::{Coefficients, Estimator};
 use trackfuse::fusion::{self, Fusion};
 use trackfuse::log::Log;
@@ -16,15 +16,15 @@ use super::climbs::Climb;
 /// How a config asks for a method.
 type Ask = fn(&mut Config);
 
-/// The methods of the tables.
+/// The methods of the tables: the paper's, as it has them, without registration; and the default, with it.
 pub(crate) const METHODS: [(&str, Ask); 7] = [
     ("GDF", |c| c.fusion.method = Estimator::Gdf),
     ("PCF 12", |c| c.fusion.method = Estimator::Pcf),
-    ("average 5", |c| (c.fusion.method, c.fusion.window_points) = (Estimator::MovingAverage, 5)),
     ("average 16", |c| (c.fusion.method, c.fusion.window_points) = (Estimator::MovingAverage, 16)),
     ("average 32", |c| (c.fusion.method, c.fusion.window_points) = (Estimator::MovingAverage, 32)),
     ("SFF independent", |c| c.fusion.coefficients = Coefficients::Independent),
     ("SFF", |_| ()),
+    ("registered", |c| c.fusion.estimate = Registration::Auto(Auto::Auto)),
 ];
 
 /// Where a climb is seen, by whom.
@@ -55,6 +55,7 @@ pub(crate) struct Pool {
     squares: f64,
     banded: usize,
     inside: f64,
+    normalised: f64,
     /// Root mean square of each run.
     pub(crate) rmses: Vec<f64>,
 }
@@ -67,12 +68,18 @@ impl Pool {
         if let Some(bands) = &errors.bands {
             self.banded += bands.count;
             self.inside += bands.inside * bands.count as f64;
+            self.normalised += bands.normalised_rmse.powi(2) * bands.count as f64;
         }
     }
 
     /// Root mean square over all instants of all runs.
     pub(crate) fn rmse(&self) -> Option<f64> {
         (self.count > 0).then(|| (self.squares / self.count as f64).sqrt())
+    }
+
+    /// Root mean square of error over standard deviation: 1 where the bands are right.
+    pub(crate) fn normalised(&self) -> Option<f64> {
+        (self.banded > 0).then(|| (self.normalised / self.banded as f64).sqrt())
     }
 
     /// Share of the truth inside the 95 % bands.
@@ -182,6 +189,7 @@ fn fuse(climb: &Climb, ask: Ask) -> Fusion {
     config.extrapolation.horizon_s = 1.5 * climb.unseen_s;
     let point = |z_m| CharacteristicPoint { name: String::new(), z_m };
     config.characteristic_point = climb.heights_m.map(point).to_vec();
+    config.fusion.estimate = Registration::List(Vec::new());
     ask(&mut config);
     let log = Log::open(&climb.log).expect("a log");
     config.source = source::recognise(&log, &config.output.prefix).expect("sources").sources;

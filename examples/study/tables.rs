@@ -61,12 +61,17 @@ fn bands(page: &mut String, families: &[Family]) {
 
 fn unseen(page: &mut String, families: &[Family]) {
     let title = "The unseen phase: median over the runs of the 3-D RMSE (in brackets: a tenth is worse)";
-    let columns = ["default m", "default m/s", "plain PCF m"].map(String::from);
+    let columns = ["default m", "default m/s", "error / sigma", "plain PCF m"].map(String::from);
     table(page, title, &columns, families, |family| {
         let Some(pools) = family.pools.last() else { return Vec::new() };
         let [position, velocity] = &pools[Part::Unseen as usize];
         let cell = |runs: &[f64]| format!("{} ({})", short(quantile(runs, 0.5)), short(quantile(runs, 0.9)));
-        vec![cell(&position.rmses), cell(&velocity.rmses), cell(&family.plain_unseen_m)]
+        vec![
+            cell(&position.rmses),
+            cell(&velocity.rmses),
+            short(position.normalised()),
+            cell(&family.plain_unseen_m),
+        ]
     });
 }
 

@@ -16,7 +16,7 @@ mod drag;
 use super::Coefficients;
 use super::EstimateError;
 use super::polynomial::{self, Prior};
-use crate::math::scalar;
+use crate::math::{robust, scalar};
 use crate::sample::Source;
 use crate::track::{Curve, Method, State};
 
@@ -180,24 +180,30 @@ pub fn best<'a>(candidates: impl IntoIterator<Item = &'a Extrapolation>) -> Opti
     candidates.into_iter().reduce(|best, next| if off(next) < off(best) { next } else { best })
 }
 
-/// The density q of greatest likelihood on one axis, m^2/s^3.
+/// The density q of greatest likelihood on one axis, m^2/s^3: the median over the origins, since a trial that was
+/// surprised by the end of a thrust says nothing of what comes.
 fn density(misses: &[Miss], axis: usize) -> f64 {
-    let cost = |exponent: f64| {
-        let q = 10.0_f64.powf(exponent);
-        let term = |error: f64, variance: f64| variance.ln() + error * error / variance;
-        misses
-            .iter()
-            .map(|m| {
-                let h = m.lead_s;
-                let variance = |a: f64, b: f64, growth: f64| (a * a + b * b + q * growth).max(1e-30);
-                let p = variance(m.made.position_sigma[axis], m.truth.position_sigma[axis], h.powi(3) / 3.0);
-                let v = variance(m.made.velocity_sigma[axis], m.truth.velocity_sigma[axis], h);
-                term(m.made.position[axis] - m.truth.position[axis], p)
-                    + term(m.made.velocity[axis] - m.truth.velocity[axis], v)
-            })
-            .sum()
+    let of_origin = |misses: &[Miss]| {
+        let cost = |exponent: f64| {
+            let q = 10.0_f64.powf(exponent);
+            let term = |error: f64, variance: f64| variance.ln() + error * error / variance;
+            misses
+                .iter()
+                .map(|m| {
+                    let h = m.lead_s;
+                    let variance = |a: f64, b: f64, growth: f64| (a * a + b * b + q * growth).max(1e-30);
+                    let p =
+                        variance(m.made.position_sigma[axis], m.truth.position_sigma[axis], h.powi(3) / 3.0);
+                    let v = variance(m.made.velocity_sigma[axis], m.truth.velocity_sigma[axis], h);
+                    term(m.made.position[axis] - m.truth.position[axis], p)
+                        + term(m.made.velocity[axis] - m.truth.velocity[axis], v)
+                })
+                .sum()
+        };
+        10.0_f64.powf(scalar::minimise(-8.0, 6.0, 28, 0.01, cost).x)
     };
-    10.0_f64.powf(scalar::minimise(-8.0, 6.0, 28, 0.01, cost).x)
+    let mut densities: Vec<f64> = misses.chunk_by(|a, b| a.origin == b.origin).map(of_origin).collect();
+    robust::median(&mut densities).unwrap_or(0.0)
 }
 
 fn holdout(misses: &[Miss]) -> Holdout {

@@ -69,15 +69,16 @@ mod tests {
         let anchor = Anchor { time_s: 4.0, point_m: [10.0, 20.0, -30.0] };
         let (t, p, v) = (6.0, [15.0, 18.0, -10.0], [1.0, -0.5, 9.0]);
         let u = [0, 1, 2].map(|i| p[i] - anchor.point_m[i]);
-        let moved = [0, 1, 2].map(|i| (1.0 + errors.scale) * u[i] + errors.bias_m[i] + errors.drift_m_s[i] * (t - 4.0));
+        let moved = [0, 1, 2]
+            .map(|i| (1.0 + errors.scale) * u[i] + errors.bias_m[i] + errors.drift_m_s[i] * (t - 4.0));
         let turned_position = turned(moved, errors.rotation_rad);
         let position = [0, 1, 2].map(|i| anchor.point_m[i] + turned_position[i]);
         let velocity = turned(
-            [0, 1, 2].map(|i| (1.0 + errors.scale) * v[i] + errors.drift_m_s[i] + errors.velocity_bias_m_s[i]),
+            [0, 1, 2]
+                .map(|i| (1.0 + errors.scale) * v[i] + errors.drift_m_s[i] + errors.velocity_bias_m_s[i]),
             errors.rotation_rad,
         );
-        for (quantity, value, truth) in
-            [(Quantity::Position, position, p), (Quantity::Velocity, velocity, v)]
+        for (quantity, value, truth) in [(Quantity::Position, position, p), (Quantity::Velocity, velocity, v)]
         {
             let sample = Sample { time_s: t + errors.clock_offset_s, value, sigma: [0.1; 3] };
             let found = corrected_sample(&errors, &anchor, quantity, &sample);
