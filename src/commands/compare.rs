@@ -4,6 +4,7 @@ use super::{CommandError, Outcome, show};
 use crate::cli::Compare;
 use crate::estimate::characteristic_point::Height;
 use crate::log::Log;
+use crate::log::decode::MessagePath;
 use crate::quality::{self, Comparison};
 use crate::report::{ComparisonParts, ComparisonReport, render_comparison};
 use crate::sample::Quantity;
@@ -25,7 +26,11 @@ pub fn compare(args: &Compare) -> Result<Outcome, CommandError> {
         reference.source.series_mut(quantity).iter_mut().for_each(|s| s.time_s += shift_s);
     }
     let mut heights = heights_of_events(&log, &args.estimate)?;
-    heights.extend(args.height.iter().cloned());
+    for height in &args.height {
+        if !heights.contains(height) {
+            heights.push(height.clone());
+        }
+    }
 
     let comparison = quality::compare(&estimate.track, t0, &reference.source, &heights);
     if comparison.all.position.is_none() && comparison.all.velocity.is_none() {
@@ -82,13 +87,12 @@ fn warnings(topic: &str, estimate: &Recorded, reference: &Loaded, comparison: &C
         ));
     }
     let paths = [&reference.config.position, &reference.config.velocity];
-    let of_reference = |made_of: &&String| {
-        paths
-            .into_iter()
-            .flatten()
-            .any(|p| p.strip_prefix(made_of.as_str()).is_some_and(|r| r.starts_with('.')))
+    let of_reference = |topic: &str| {
+        paths.into_iter().flatten().any(|p| MessagePath::parse(p).is_ok_and(|p| p.topic == topic))
     };
-    if let Some(made_of) = estimate.made_of.iter().find(of_reference) {
+    if of_reference(topic) {
+        warnings.push(format!("the reference is {topic} itself: that they agree proves nothing"));
+    } else if let Some(made_of) = estimate.made_of.iter().find(|made_of| of_reference(made_of)) {
         warnings.push(format!("{topic} was made of {made_of}: that it agrees with it proves nothing"));
     }
     for (q, errors) in [&comparison.all.position, &comparison.all.velocity].into_iter().enumerate() {
