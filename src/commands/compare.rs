@@ -8,7 +8,7 @@ use crate::log::decode::MessagePath;
 use crate::quality::{self, Comparison};
 use crate::report::{ComparisonParts, ComparisonReport, render_comparison};
 use crate::sample::Quantity;
-use crate::source::{self, Loaded, Recorded};
+use crate::source::{self, Loaded, Recorded, SigmaOrigin};
 use crate::time::Time;
 
 /// Holds a track against a reference, and says how far they are apart.
@@ -95,15 +95,29 @@ fn warnings(topic: &str, estimate: &Recorded, reference: &Loaded, comparison: &C
     } else if let Some(made_of) = estimate.made_of.iter().find(|made_of| of_reference(made_of)) {
         warnings.push(format!("{topic} was made of {made_of}: that it agrees with it proves nothing"));
     }
+    let noise = reference.sigma.map(|s| s.filter(|s| s.1 != SigmaOrigin::Assumed).map(|s| s.0));
+    for (q, errors) in [&comparison.all.position, &comparison.all.velocity].into_iter().enumerate() {
+        // what the track thinks of itself: errors over sigmas, against errors
+        let bands = errors.as_ref().and_then(|e| Some((e, e.bands.as_ref()?)));
+        let own = bands.map(|(e, b)| e.rmse / b.normalised_rmse / 3.0_f64.sqrt());
+        if let Some((noise, own)) = noise[q].zip(own).filter(|(noise, own)| noise > &(0.3 * own)) {
+            let (what, unit) = (Quantity::ALL[q].name(), Quantity::ALL[q].unit());
+            warnings.push(format!(
+                "the reference's {what} has a noise of {noise:.3} {unit} of its own, the track's bands are of {own:.3} \
+                 {unit}: errors and what lies inside the bands hold both"
+            ));
+        }
+    }
     for (q, errors) in [&comparison.all.position, &comparison.all.velocity].into_iter().enumerate() {
         let quantity = Quantity::ALL[q];
         let Some((errors, by)) = errors.as_ref().zip(comparison.interpolated[q].as_ref()) else { continue };
-        if by.error > 0.2 * errors.rmse {
+        let error = by.error.unwrap_or(f64::INFINITY);
+        if error > 0.2 * errors.rmse {
             warnings.push(format!(
                 "the {} is too coarse: interpolating its {} is off by {:.3} {unit}, of an error of {:.3} {unit}",
                 by.series,
                 quantity.name(),
-                by.error,
+                error,
                 errors.rmse,
                 unit = quantity.unit()
             ));

@@ -77,11 +77,8 @@ fn head(out: &mut String, report: &ComparisonReport) -> fmt::Result {
         (&report.interpolated_velocity, "m/s", "velocities"),
     ] {
         if let Some(by) = by {
-            writeln!(
-                out,
-                "{what} of the {} are interpolated, which is off by {:.4} {unit} (rms)",
-                by.series, by.error
-            )?;
+            let off = by.error.map_or("nobody knows how far".into(), |e| format!("by {e:.4} {unit} (rms)"));
+            writeln!(out, "{what} of the {} are interpolated, which is off {off}", by.series)?;
         }
     }
     Ok(())

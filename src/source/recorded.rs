@@ -110,7 +110,8 @@ fn last_field(path: &MessagePath) -> Option<&str> {
 /// Whether a field's name is one that velocities usually have.
 fn is_velocity(field: &str) -> bool {
     let field = field.to_ascii_lowercase();
-    ["vel", "linear", "twist", "speed"].iter().any(|word| field.contains(word))
+    let has = |word: &&str| field.contains(*word);
+    ["vel", "linear", "twist", "speed"].iter().any(has) && !["accel", "angular"].iter().any(has)
 }
 
 /// A point as this program writes it.
