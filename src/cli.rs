@@ -102,7 +102,10 @@ pub struct Simulate {
 #[command(after_help = "Examples:
   trackfuse compare dive.fused.mcap --reference /ins/odom
   trackfuse compare dive.fused.mcap --reference /ins/pose.position --reference /ins/twist.linear
-  trackfuse compare dive.mcap --estimate /beacon/track --reference /ins/odom   a sensor instead of a track")]
+  trackfuse compare dive.mcap --estimate /beacon/track --reference /ins/odom   a sensor instead of a track
+
+Exit codes: 0 done; 1 failed, or no instant in common; 2 usage wrong, such as a topic that isn't there;
+3 done, with warnings that a person must read, such as frames that differ")]
 pub struct Compare {
     /// The log that holds both
     pub log: PathBuf,
@@ -132,6 +135,12 @@ fn height(text: &str) -> Result<Height, String> {
 
 /// Arguments of `export`.
 #[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  trackfuse export dive.fused.mcap > dive.csv
+  trackfuse export dive.fused.mcap --topic /fused/pcf -o pcf.csv
+
+Exit codes: 0 done; 1 failed, nothing written; 2 output exists, or no such topic; 3 done, with warnings
+that a person must read, such as messages that can't be read")]
 pub struct Export {
     /// The log to read
     pub log: PathBuf,

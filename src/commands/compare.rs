@@ -4,10 +4,11 @@ use super::{CommandError, Outcome, show};
 use crate::cli::Compare;
 use crate::estimate::characteristic_point::Height;
 use crate::log::Log;
+use crate::log::decode::MessagePath;
 use crate::quality::{self, Comparison};
 use crate::report::{ComparisonParts, ComparisonReport, render_comparison};
 use crate::sample::Quantity;
-use crate::source::{self, Loaded, Recorded};
+use crate::source::{self, Loaded, Recorded, SigmaOrigin};
 use crate::time::Time;
 
 /// Holds a track against a reference, and says how far they are apart.
@@ -25,7 +26,11 @@ pub fn compare(args: &Compare) -> Result<Outcome, CommandError> {
         reference.source.series_mut(quantity).iter_mut().for_each(|s| s.time_s += shift_s);
     }
     let mut heights = heights_of_events(&log, &args.estimate)?;
-    heights.extend(args.height.iter().cloned());
+    for height in &args.height {
+        if !heights.contains(height) {
+            heights.push(height.clone());
+        }
+    }
 
     let comparison = quality::compare(&estimate.track, t0, &reference.source, &heights);
     if comparison.all.position.is_none() && comparison.all.velocity.is_none() {
@@ -82,24 +87,37 @@ fn warnings(topic: &str, estimate: &Recorded, reference: &Loaded, comparison: &C
         ));
     }
     let paths = [&reference.config.position, &reference.config.velocity];
-    let of_reference = |made_of: &&String| {
-        paths
-            .into_iter()
-            .flatten()
-            .any(|p| p.strip_prefix(made_of.as_str()).is_some_and(|r| r.starts_with('.')))
+    let of_reference = |topic: &str| {
+        paths.into_iter().flatten().any(|p| MessagePath::parse(p).is_ok_and(|p| p.topic == topic))
     };
-    if let Some(made_of) = estimate.made_of.iter().find(of_reference) {
+    if of_reference(topic) {
+        warnings.push(format!("the reference is {topic} itself: that they agree proves nothing"));
+    } else if let Some(made_of) = estimate.made_of.iter().find(|made_of| of_reference(made_of)) {
         warnings.push(format!("{topic} was made of {made_of}: that it agrees with it proves nothing"));
+    }
+    let noise = reference.sigma.map(|s| s.filter(|s| s.1 != SigmaOrigin::Assumed).map(|s| s.0));
+    for (q, errors) in [&comparison.all.position, &comparison.all.velocity].into_iter().enumerate() {
+        // what the track thinks of itself: errors over sigmas, against errors
+        let bands = errors.as_ref().and_then(|e| Some((e, e.bands.as_ref()?)));
+        let own = bands.map(|(e, b)| e.rmse / b.normalised_rmse / 3.0_f64.sqrt());
+        if let Some((noise, own)) = noise[q].zip(own).filter(|(noise, own)| noise > &(0.3 * own)) {
+            let (what, unit) = (Quantity::ALL[q].name(), Quantity::ALL[q].unit());
+            warnings.push(format!(
+                "the reference's {what} has a noise of {noise:.3} {unit} of its own, the track's bands are of {own:.3} \
+                 {unit}: errors and what lies inside the bands hold both"
+            ));
+        }
     }
     for (q, errors) in [&comparison.all.position, &comparison.all.velocity].into_iter().enumerate() {
         let quantity = Quantity::ALL[q];
         let Some((errors, by)) = errors.as_ref().zip(comparison.interpolated[q].as_ref()) else { continue };
-        if by.error > 0.2 * errors.rmse {
+        let error = by.error.unwrap_or(f64::INFINITY);
+        if error > 0.2 * errors.rmse {
             warnings.push(format!(
                 "the {} is too coarse: interpolating its {} is off by {:.3} {unit}, of an error of {:.3} {unit}",
                 by.series,
                 quantity.name(),
-                by.error,
+                error,
                 errors.rmse,
                 unit = quantity.unit()
             ));

@@ -2,12 +2,11 @@
 
 use std::io::{self, BufWriter, Write};
 
-use serde_json::json;
-
 use super::{CommandError, Outcome, say, show};
 use crate::cli::{Export, Format};
 use crate::log::{Log, LogError, write_new};
-use crate::report::csv;
+use crate::printable::printable;
+use crate::report::{ExportReport, csv};
 use crate::source;
 
 /// Writes a track as a table, on stdout or to a file.
@@ -18,39 +17,27 @@ use crate::source;
 pub fn export(args: &Export) -> Result<Outcome, CommandError> {
     let Format::Csv = args.format;
     let log = Log::open(&args.log)?;
+    if let Some(out) = &args.output {
+        log.ensure_other(out)?;
+    }
     let recorded = source::recorded(&log, &args.topic)?;
     let t0 = recorded.origin();
     let warnings = &recorded.warnings;
-    let points = recorded.track.points.len();
+    let mut report = ExportReport::new(args.log.display().to_string(), &args.topic, &recorded);
     if let Some(out) = &args.output {
         let len = write_new(out, args.force, |file| {
             csv::write_csv(&recorded, t0, file)
                 .map_err(|source| LogError::Write { path: out.clone(), source })
         })?;
-        let text = format!("{} -> {} ({points} points, {len} bytes)\n", args.topic, out.display());
-        let summary = json!({
-            "log": args.log.display().to_string(),
-            "topic": args.topic,
-            "t0_ns": t0.ns().to_string(),
-            "frame_id": recorded.track.frame_id,
-            "output": out.display().to_string(),
-            "points": points,
-            "bytes": len.to_string(),
-            "warnings": warnings,
-        });
-        say(args.voice, &text, &summary, warnings);
+        let text = format!("{} -> {} ({} points, {len} bytes)", args.topic, out.display(), report.points);
+        let mut text = printable(&text).into_owned() + "\n";
+        text.extend(warnings.iter().map(|w| format!("warning: {}\n", printable(w))));
+        report.output = Some(out.display().to_string());
+        report.bytes = Some(len.to_string());
+        say(args.voice, &text, &report, warnings);
     } else if args.voice.json {
-        let rows: Vec<Vec<String>> = csv::rows(&recorded, t0).collect();
-        let table = json!({
-            "log": args.log.display().to_string(),
-            "topic": args.topic,
-            "t0_ns": t0.ns().to_string(),
-            "frame_id": recorded.track.frame_id,
-            "columns": csv::COLUMNS,
-            "rows": rows,
-            "warnings": warnings,
-        });
-        show(args.voice, "", &table, warnings)?;
+        report.rows = Some(csv::rows(&recorded, t0).collect());
+        show(args.voice, "", &report, warnings)?;
     } else {
         let mut stdout = BufWriter::new(io::stdout().lock());
         match csv::write_csv(&recorded, t0, &mut stdout).and_then(|()| stdout.flush()) {

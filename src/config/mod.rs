@@ -254,7 +254,7 @@ pub enum Auto {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Extrapolation {
-    /// The method; `pcf`, a constrained polynomial, is the only one yet.
+    /// The method.
     pub method: ExtrapolationMethod,
     /// How far, s; 0 for none.
     pub horizon_s: f64,

@@ -11,8 +11,8 @@ pub struct Interpolated {
     /// `reference`, or `estimate` where the reference has fewer instants.
     pub series: String,
     /// Root mean square 3-D error that the interpolation makes, from the series' second differences, m or m/s.
-    /// Noise of the series is in it, so it is rather too large.
-    pub error: f64,
+    /// Noise of the series is in it, so it is rather too large; null where it has too few samples to tell.
+    pub error: Option<f64>,
 }
 
 /// A straight line between samples h apart is off by h^2 a / 8 in the middle, by sqrt(8/15) of that in the mean
@@ -21,7 +21,7 @@ const OF_SECOND_DIFFERENCE: f64 = 0.25 * 0.730_296_743_340_221_5;
 
 /// Root mean square error of linear interpolation within `[from_s, to_s]`, from how far samples lie from the
 /// line between their neighbours; samples beside a gap longer than `max_gap_s` don't count.
-pub(super) fn linear_error(series: &[Sample], from_s: f64, to_s: f64, max_gap_s: f64) -> f64 {
+pub(super) fn linear_error(series: &[Sample], from_s: f64, to_s: f64, max_gap_s: f64) -> Option<f64> {
     let (mut squares, mut count) = (0.0, 0_usize);
     for three in series.windows(3) {
         let [a, b, c] = [&three[0], &three[1], &three[2]];
@@ -37,7 +37,7 @@ pub(super) fn linear_error(series: &[Sample], from_s: f64, to_s: f64, max_gap_s:
             .sum::<f64>();
         count += 1;
     }
-    OF_SECOND_DIFFERENCE * (squares / count.max(1) as f64).sqrt()
+    (count > 0).then(|| OF_SECOND_DIFFERENCE * (squares / count as f64).sqrt())
 }
 
 #[cfg(test)]
@@ -53,7 +53,7 @@ mod tests {
         let functions: [&dyn Fn(f64) -> f64; 2] = [&|t| 3.0 * t * t, &|t| (2.0 * t).sin()];
         for f in functions {
             let series = series(f);
-            let stated = linear_error(&series, 0.0, 10.0, 1.0);
+            let stated = linear_error(&series, 0.0, 10.0, 1.0).expect("many samples");
             let errors = (0..10_000).map(|i| {
                 let t = 1e-3 * f64::from(i);
                 let (i, share) = ((t / 0.1) as usize, t / 0.1 - (t / 0.1).floor());

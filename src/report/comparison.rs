@@ -5,7 +5,8 @@ use serde::Serialize;
 
 use crate::estimate::characteristic_point::CharacteristicPoint;
 use crate::quality::{Comparison, CrossingErrors, Errors, Interpolated, Jump, Kind, Stretch};
-use crate::source::{Loaded, Recorded};
+use crate::sample::Quantity;
+use crate::source::{Loaded, Recorded, SigmaOrigin};
 use crate::time::Time;
 
 /// The report of `compare`. Nanoseconds are strings, since JSON numbers lose them; all `_s` times count from T0;
@@ -65,7 +66,7 @@ pub struct ReferenceReport {
     pub span_s: Option<(f64, f64)>,
     /// What its times are: `stamp`, `publish` or `log`.
     pub clock: String,
-    /// Standard deviation of its positions, m, from its messages or its scatter.
+    /// Standard deviation of its positions, m, from its messages or its scatter; null where these don't tell.
     pub position_sigma_m: Option<f64>,
     /// Standard deviation of its velocities, m/s.
     pub velocity_sigma_m_s: Option<f64>,
@@ -184,8 +185,8 @@ impl ComparisonReport {
                 velocities: reference.source.velocities.len(),
                 span_s: reference.source.span_s(),
                 clock: reference.timing.clock.clone(),
-                position_sigma_m: reference.sigma[0].map(|s| s.0),
-                velocity_sigma_m_s: reference.sigma[1].map(|s| s.0),
+                position_sigma_m: known_sigma(reference, Quantity::Position),
+                velocity_sigma_m_s: known_sigma(reference, Quantity::Velocity),
             },
             frame_id: estimate.track.frame_id.clone(),
             points: estimate.track.points.len(),
@@ -208,6 +209,11 @@ impl ComparisonReport {
             warnings: warnings.to_vec(),
         }
     }
+}
+
+/// A reference's standard deviation, where it is more than an assumption.
+fn known_sigma(reference: &Loaded, quantity: Quantity) -> Option<f64> {
+    reference.sigma[quantity as usize].filter(|s| s.1 != SigmaOrigin::Assumed).map(|s| s.0)
 }
 
 impl CrossingReport {

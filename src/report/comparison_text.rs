@@ -62,7 +62,7 @@ fn head(out: &mut String, report: &ComparisonReport) -> fmt::Result {
         (reference.positions, "positions", reference.position_sigma_m, "m"),
         (reference.velocities, "velocities", reference.velocity_sigma_m_s, "m/s"),
     ] {
-        let noise = sigma.map_or(String::new(), |s| format!(" (noise {s:.1e} {unit})"));
+        let noise = sigma.map_or(" (noise unknown)".into(), |s| format!(" (noise {s:.1e} {unit})"));
         if count > 0 {
             parts.push(format!("{count} {what}{noise}"));
         }
@@ -77,11 +77,8 @@ fn head(out: &mut String, report: &ComparisonReport) -> fmt::Result {
         (&report.interpolated_velocity, "m/s", "velocities"),
     ] {
         if let Some(by) = by {
-            writeln!(
-                out,
-                "{what} of the {} are interpolated, which is off by {:.4} {unit} (rms)",
-                by.series, by.error
-            )?;
+            let off = by.error.map_or("nobody knows how far".into(), |e| format!("by {e:.4} {unit} (rms)"));
+            writeln!(out, "{what} of the {} are interpolated, which is off {off}", by.series)?;
         }
     }
     Ok(())
@@ -100,10 +97,11 @@ fn quantity<'r>(
     if rows.is_empty() {
         return Ok(());
     }
+    let width = rows.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).max(30);
     writeln!(out)?;
     writeln!(
         out,
-        "{title:<30} {:>8} {:>9} {:>26} {:>26} {:>8} {:>7} {:>9} {:>12}",
+        "{title:<width$} {:>8} {:>9} {:>26} {:>26} {:>8} {:>7} {:>9} {:>12}",
         "instants", "rmse 3-D", "rmse x y z", "mean x y z", "max", "inside", "err/sigma", "correlated s"
     )?;
     for (name, e) in &rows {
@@ -111,7 +109,7 @@ fn quantity<'r>(
         let [mx, my, mz] = e.mean_by_axis;
         write!(
             out,
-            "{name:<30} {:>8} {:>9.3} {x:>8.3} {y:>8.3} {z:>8.3} {mx:>+8.3} {my:>+8.3} {mz:>+8.3} {:>8.3}",
+            "{name:<width$} {:>8} {:>9.3} {x:>8.3} {y:>8.3} {z:>8.3} {mx:>+8.3} {my:>+8.3} {mz:>+8.3} {:>8.3}",
             e.count, e.rmse, e.max
         )?;
         if let Some(bands) = &e.bands {

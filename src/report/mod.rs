@@ -4,6 +4,7 @@ mod amount;
 mod comparison;
 mod comparison_text;
 pub mod csv;
+mod export;
 pub mod inspection;
 mod proposal;
 mod text;
@@ -12,6 +13,7 @@ pub use comparison::{
     ComparisonParts, ComparisonReport, Crossing, CrossingReport, PhaseErrors, ReferenceReport, WorstReport,
 };
 pub use comparison_text::render_comparison;
+pub use export::ExportReport;
 pub use inspection::render_inspection;
 pub use proposal::InitReport;
 pub use text::render;

@@ -153,6 +153,17 @@ pub enum SourceError {
         /// What its messages hold.
         found: String,
     },
+    /// Two of what there can be one of.
+    #[error(
+        "the {what} of the reference is given twice, by {} and by {}; expected one",
+        printable(&paths[0]), printable(&paths[1])
+    )]
+    GivenTwice {
+        /// Position or velocity.
+        what: &'static str,
+        /// The message paths.
+        paths: [String; 2],
+    },
     /// Nothing was measured.
     #[error("source {name:?}: topic {topic:?} has no messages that its path lets through")]
     Empty {
@@ -205,7 +216,7 @@ impl SourceError {
                 format!("name the {what} by its message path: `{}.field`", printable(topic))
             }
             Self::NoTime { .. } | Self::OneInstant { .. } => {
-                "`time = \"publish\"` or `time = \"log\"` in this source takes another clock".into()
+                "`time = \"publish\"` or `time = \"log\"` in this source takes another clock; for a reference, `--reference-time`".into()
             }
             _ => return None,
         };

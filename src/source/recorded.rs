@@ -58,7 +58,8 @@ pub fn recorded(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
 /// Reads what a track is to be held against: topics, or message paths of a position and of a velocity.
 ///
 /// # Errors
-/// [`SourceError`], as [`load`]; [`SourceError::NoVectors`] for a topic that holds neither.
+/// [`SourceError`], as [`load`]; [`SourceError::NoVectors`] for a topic that holds neither;
+/// [`SourceError::GivenTwice`].
 pub fn reference(
     log: &Log,
     given: &[String],
@@ -72,26 +73,45 @@ pub fn reference(
         } else {
             MessagePath::parse(text).map_err(|error| SourceError::Path { name: name.clone(), error })?
         };
-        let (position, velocity) = match path.steps.last() {
-            None => {
-                let found = of_topic(log, &path.topic)?;
-                (found.position, found.velocity)
-            }
-            Some(Step::Field(field)) if is_velocity(field) => (None, Some(text.clone())),
-            Some(_) => (Some(text.clone()), None),
+        let (position, velocity) = if path.steps.is_empty() {
+            let found = of_topic(log, &path.topic)?;
+            (found.position, found.velocity)
+        } else if last_field(&path).is_some_and(is_velocity) {
+            (None, Some(text.clone()))
+        } else {
+            (Some(text.clone()), None)
         };
-        config.position = config.position.take().or(position);
-        config.velocity = config.velocity.take().or(velocity);
+        for (known, new, what) in
+            [(&mut config.position, position, "position"), (&mut config.velocity, velocity, "velocity")]
+        {
+            match (known.as_ref(), new) {
+                (Some(first), Some(second)) => {
+                    let paths = [first.clone(), second];
+                    return Err(SourceError::GivenTwice { what, paths });
+                }
+                (None, Some(new)) => *known = Some(new),
+                (_, None) => {}
+            }
+        }
     }
     let (mut loaded, origin, _) = load(log, &[config], true)?;
     let one = loaded.pop().ok_or(SourceError::Empty { name, topic: given.join(", ") })?;
     Ok((one, origin))
 }
 
+/// The field at a path's end, or of which it ends at an element.
+fn last_field(path: &MessagePath) -> Option<&str> {
+    path.steps.iter().rev().find_map(|step| match step {
+        Step::Field(field) => Some(field.as_str()),
+        _ => None,
+    })
+}
+
 /// Whether a field's name is one that velocities usually have.
 fn is_velocity(field: &str) -> bool {
     let field = field.to_ascii_lowercase();
-    ["vel", "linear", "twist", "speed"].iter().any(|word| field.contains(word))
+    let has = |word: &&str| field.contains(*word);
+    ["vel", "linear", "twist", "speed"].iter().any(has) && !["accel", "angular"].iter().any(has)
 }
 
 /// A point as this program writes it.
@@ -228,7 +248,12 @@ fn topics_of(metadata: &BTreeMap<String, String>) -> Vec<String> {
     }
     let text = metadata.get("config").map_or("", String::as_str);
     let config: Config = toml::from_str(text).unwrap_or_default();
-    let paths = config.source.into_iter().flat_map(|s| [s.position, s.velocity]).flatten();
+    topics_among(config.source.into_iter().flat_map(|s| [s.position, s.velocity]))
+}
+
+/// The topics of message paths.
+fn topics_among(paths: impl IntoIterator<Item = Option<String>>) -> Vec<String> {
+    let paths = paths.into_iter().flatten();
     paths.filter_map(|path| Some(MessagePath::parse(&path).ok()?.topic)).collect()
 }
 
@@ -261,7 +286,7 @@ fn foreign_track(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
         sources: vec![topic.to_owned()],
         has_phases: false,
         t0: None,
-        made_of: vec![topic.to_owned()],
+        made_of: topics_among([loaded.config.position, loaded.config.velocity]),
         warnings: loaded.warnings,
     })
 }

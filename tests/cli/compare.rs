@@ -96,6 +96,11 @@ fn compare_of_frames_that_differ_and_of_a_source_is_done_with_a_warning() {
     let circular = compare(&trial, &["--reference", "/tether/track"]);
     assert_eq!(circular.code, 3, "{circular:#?}");
     assert_says(&circular.stdout, &["made of /tether/track", "proves nothing"]);
+    for topic in ["/fused/track", "/tether/track"] {
+        let of_itself = compare(&trial, &["--estimate", topic, "--reference", topic]);
+        assert_eq!(of_itself.code, 3, "{of_itself:#?}");
+        assert_says(&of_itself.stdout, &[&format!("the reference is {topic} itself"), "proves nothing"]);
+    }
 }
 
 #[test]
@@ -115,7 +120,9 @@ fn compare_of_a_coarse_reference_says_that_it_is() {
 fn compare_refuses_what_can_not_be_compared() {
     let trial = Trial::of(two_sensors());
     assert_eq!(trial.fuse(&[]).code, 0);
-    let cases: [(&[&str], i32, &[&str]); 4] = [
+    let twice = ["--reference", "/tether/track", "--reference", "/beacon/track.velocity"];
+    let cases: [(&[&str], i32, &[&str]); 5] = [
+        (&twice, 2, &["velocity of the reference is given twice", "/beacon/track.velocity"]),
         (&["--reference", "/nowhere"], 2, &["/nowhere", "it has:"]),
         (&["--reference", "/fused/log"], 2, &["/fused/log", "no position or velocity", "hint:"]),
         (&["--reference", "/tether/track", "--estimate", "/fused/nothing"], 2, &["/fused/nothing"]),

@@ -49,6 +49,11 @@ fn export_to_a_file_is_that_of_stdout_and_never_replaces_one_unasked() {
     assert_eq!((refused.code, fs::read(trial.path("track.csv")).unwrap()), (2, b"mine".to_vec()));
     assert_eq!(run(&["-o", "track.csv", "--force"]).code, 0);
     assert_eq!(fs::read_to_string(trial.path("track.csv")).unwrap(), printed);
+    let log = fs::read(trial.path("in.fused.mcap")).unwrap();
+    let refused = run(&["-o", "in.fused.mcap", "--force"]);
+    assert_eq!(refused.code, 2, "{refused:#?}");
+    assert_says(&refused.stderr, &["is the input itself"]);
+    assert!(fs::read(trial.path("in.fused.mcap")).unwrap() == log, "the log is as it was");
     let table: serde_json::Value = serde_json::from_str(&run(&["--json"]).stdout).unwrap();
     assert_eq!(table["rows"].as_array().unwrap().len(), printed.lines().count() - 1);
 }
