@@ -269,6 +269,7 @@ impl<'a> Fit<'a> {
             .flat_map(|source| Quantity::ALL.map(|quantity| (source, quantity)))
             .map(|(source, quantity)| Weighted {
                 source,
+                block: self.layout.slots.iter().position(|&s| s == source).unwrap_or(0),
                 quantity,
                 samples: self.sources[source].series(quantity),
                 weights: &weights[source][quantity as usize],

@@ -145,6 +145,7 @@ fn solution_and_covariance_equal_those_of_the_dense_stacked_problem() {
         .flat_map(|s| Quantity::ALL.map(|q| (s, q)))
         .map(|(s, quantity)| Weighted {
             source: s,
+            block: 0,
             quantity,
             samples: sources[s].series(quantity),
             weights: &weights[s][quantity as usize],
