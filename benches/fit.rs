@@ -1,6 +1,6 @@
 //! Cost of SFF a sample, positions and velocities on three axes: the fit with its penalty's weight found and
 //! its posterior covariance, and the evaluation of states with their sigmas. Neither should depend on the
-//! number of samples.
+//! number of samples. Registration of two sources likewise.
 
 use criterion::{
     BatchSize, BenchmarkId, Criterion, SamplingMode, Throughput, criterion_group, criterion_main,
@@ -8,6 +8,7 @@ use criterion::{
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use trackfuse::estimate::registration;
 use trackfuse::estimate::spline::{self, Settings};
 use trackfuse::sample::{Sample, Source};
 use trackfuse::track::Curve;
@@ -52,5 +53,30 @@ fn sff(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, sff);
+/// All unknowns of a second source, robust, three axes: cost an instant with a position and a velocity.
+fn register(c: &mut Criterion) {
+    let mut group = c.benchmark_group("registration");
+    group.sample_size(10).sampling_mode(SamplingMode::Flat);
+    for samples in [1_000, 10_000, 100_000] {
+        let whole = source(samples * 2 / 3);
+        let end_s = whole.span_s().map_or(0.0, |s| s.1);
+        let mut late = whole.within(0.5 * end_s, end_s);
+        for sample in &mut late.positions {
+            sample.value = sample.value.map(|v| v + 1.0);
+        }
+        late.positions.iter_mut().chain(&mut late.velocities).for_each(|s| s.time_s += 0.03);
+        let count = whole.len() + late.len();
+        let sources = [whole, late];
+        group.throughput(Throughput::Elements(count as u64));
+        group.bench_function(BenchmarkId::new("register", count), |b| {
+            let settings = registration::Settings::default();
+            b.iter(|| {
+                registration::register(&sources, 0, &[(0.0, end_s)], &settings).expect("a good problem")
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, sff, register);
 criterion_main!(benches);

@@ -69,7 +69,7 @@ pub(super) struct Information {
 #[derive(Clone, Debug)]
 pub(super) struct Eliminated {
     factors: [Cholesky; 3],
-    /// `A^-1 [B f]` by axis and source; f in column [`VALUE`], a source's own share of it.
+    /// `A^-1 [B f]` by axis and block; f in column [`VALUE`], a block's own share of it.
     solved: [Vec<Vec<[f64; COLUMNS]>>; 3],
     pub(super) information: Information,
     /// -2 log of the likelihood at u = 0, without the constant.
@@ -91,7 +91,7 @@ pub(super) fn factor(gram: &Banded, penalty: &Banded, lambda: f64) -> Option<Cho
     })
 }
 
-/// `D - B' A^-1 B` of one axis for two sources, from what `a' b` makes of their borders: `D` is zero unless they are
+/// `D - B' A^-1 B` of one axis for two blocks, from what `a' b` makes of their borders: `D` is zero unless they are
 /// the same.
 pub(super) fn complement(
     corner: Option<&[[f64; COLUMNS]; COLUMNS]>,
@@ -151,13 +151,11 @@ pub(super) fn eliminate(
             columns
         });
         solved[axis] = columns.collect::<Vec<_>>();
-        let sources = solved[axis].len();
-        let place = |source: usize, column: usize| {
-            let slot = layout.slots.iter().position(|&s| s == source)?;
-            places[index(slot, Kind::ALL[column], axis)]
-        };
-        for i in 0..sources {
-            for j in 0..sources {
+        let blocks = solved[axis].len();
+        let place =
+            |slot: usize, column: usize| places.get(index(slot, Kind::ALL[column], axis)).copied().flatten();
+        for i in 0..blocks {
+            for j in 0..blocks {
                 let corner = (i == j).then_some(&normal.corner[axis][i]);
                 let complement = complement(corner, &normal.border[axis][i], &solved[axis][j]);
                 deviance += complement[VALUE][VALUE];
@@ -248,10 +246,10 @@ impl Eliminated {
             for columns in &self.solved[axis] {
                 coefficients.iter_mut().zip(columns).for_each(|(c, from)| c[axis] += from[VALUE]);
             }
-            for (slot, &source) in layout.slots.iter().enumerate() {
+            for slot in 0..layout.slots.len() {
                 let of_axis = |j: usize| unknowns[index(slot, Kind::ALL[j], axis)];
                 let u: [f64; OF_AN_AXIS] = std::array::from_fn(of_axis);
-                for (c, g) in coefficients.iter_mut().zip(&self.solved[axis][source]) {
+                for (c, g) in coefficients.iter_mut().zip(&self.solved[axis][slot]) {
                     c[axis] -= (0..OF_AN_AXIS).map(|j| g[j] * u[j]).sum::<f64>();
                 }
             }
@@ -263,11 +261,9 @@ impl Eliminated {
             (0..size * size).map(|ij| covariance[(at(ij / size), at(ij % size))]).collect()
         });
         let response = std::array::from_fn(|axis| {
-            let of = |&source: &usize| {
-                let columns = &self.solved[axis][source];
-                columns.iter().map(|g| std::array::from_fn(|j| g[j])).collect()
-            };
-            layout.slots.iter().map(of).collect()
+            let of =
+                |slot: usize| self.solved[axis][slot].iter().map(|g| std::array::from_fn(|j| g[j])).collect();
+            (0..slots).map(of).collect()
         });
         let inverse = std::array::from_fn(|axis| self.factors[axis].selected_inverse());
         Posterior { coefficients, inverse, response, local, unknowns, covariance }

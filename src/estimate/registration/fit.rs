@@ -15,8 +15,17 @@ use crate::math::gaussian_basis::Active;
 use crate::math::robust;
 use crate::sample::{Quantity, Source};
 
-/// Steps with weights that minimise absolute values, before outliers are told from noise.
+/// Steps with weights that minimise absolute values, before outliers are told from noise: so many, and more until the
+/// clock offsets come to rest.
 const FIRST_STEPS: usize = 4;
+const MOST_FIRST_STEPS: usize = 12;
+
+/// A clock offset is at rest that moves by less than this share of its sigma.
+const AT_REST: f64 = 0.3;
+
+/// The priors' sigmas are so many times wider in those steps: far from the solution noise looks large, and would hold
+/// a clock back that is far off.
+const FIRST_WIDENING: f64 = 3.0;
 
 /// Steps after which a fit that still moves is left as it is.
 const MOST_STEPS: usize = 40;
@@ -58,6 +67,7 @@ pub(super) struct Fit<'a> {
     /// How far about the last lambda the next one is looked for, decades.
     search_decades: [f64; 3],
     relaxations: Vec<Relaxation>,
+    stage: Stage,
     pub(super) posterior: Option<Posterior>,
     pub(super) inclusions: Vec<Inclusion>,
     pub(super) separations: Vec<(Option<(separation::Name, f64)>, separation::Separation)>,
@@ -71,8 +81,8 @@ pub(super) struct Fit<'a> {
 enum Stage {
     /// By absolute values.
     First,
-    /// By a mixture of scales.
-    Mixture,
+    /// By a mixture of scales, since that many steps.
+    Mixture { since: usize },
 }
 
 /// Which unknowns are thought to be there.
@@ -116,10 +126,20 @@ impl<'a> Fit<'a> {
             if step == 0 {
                 fit.put_anchors_on_curve();
             }
-            let first = settings.robust && step < FIRST_STEPS;
-            fit.reweigh(if first { Stage::First } else { Stage::Mixture });
+            fit.reweigh();
             fit.iterations = step + 1;
-            fit.converged = step > FIRST_STEPS + 1 && fit.is_settled(before.0.as_deref(), &before.1);
+            match fit.stage {
+                Stage::First => {
+                    let over = fit.iterations >= FIRST_STEPS && fit.clocks_rest();
+                    if over || fit.iterations == MOST_FIRST_STEPS {
+                        fit.stage = Stage::Mixture { since: fit.iterations };
+                    }
+                }
+                Stage::Mixture { since } => {
+                    fit.converged =
+                        fit.iterations > since + 1 && fit.is_settled(before.0.as_deref(), &before.1);
+                }
+            }
             if fit.converged {
                 break;
             }
@@ -127,7 +147,7 @@ impl<'a> Fit<'a> {
         if settings.select {
             for _ in 0..LAST_STEPS {
                 fit.solve(Choice::ByEvidence)?;
-                fit.reweigh(Stage::Mixture);
+                fit.reweigh();
             }
         }
         fit.solve(if settings.select { Choice::ByEvidence } else { Choice::All })?;
@@ -164,6 +184,7 @@ impl<'a> Fit<'a> {
             lambda: [1.0; 3],
             search_decades: [WIDEST_SEARCH; 3],
             relaxations: vec![Relaxation::default(); slots.len()],
+            stage: Stage::First,
             layout: Layout { slots, active: Vec::new() },
             posterior: None,
             inclusions: Vec::new(),
@@ -200,11 +221,15 @@ impl<'a> Fit<'a> {
         self.layout.active = self.acting();
         let normal = self.normal();
         let priors = &self.settings.priors;
+        let widening = if self.stage == Stage::First { FIRST_WIDENING } else { 1.0 };
         let variances: Vec<f64> =
-            self.layout.active.iter().map(|&i| priors.of(kind_of(i).0).powi(2)).collect();
+            self.layout.active.iter().map(|&i| (widening * priors.of(kind_of(i).0)).powi(2)).collect();
         for axis in 0..3 {
             // everywhere at first, and again when outliers are told from noise
-            let anew = self.iterations == 0 || (FIRST_STEPS..FIRST_STEPS + 3).contains(&self.iterations);
+            let anew = match self.stage {
+                Stage::First => self.iterations == 0,
+                Stage::Mixture { since } => self.iterations < since + 3,
+            };
             let last = self.lambda[axis];
             let about = (!anew).then_some((last, self.search_decades[axis]));
             let lambda = likeliest_lambda(&normal, &self.penalty, &self.layout, &variances, axis, about);
@@ -244,6 +269,7 @@ impl<'a> Fit<'a> {
             .flat_map(|source| Quantity::ALL.map(|quantity| (source, quantity)))
             .map(|(source, quantity)| Weighted {
                 source,
+                block: self.layout.slots.iter().position(|&s| s == source).unwrap_or(0),
                 quantity,
                 samples: self.sources[source].series(quantity),
                 weights: &weights[source][quantity as usize],
@@ -286,16 +312,17 @@ impl<'a> Fit<'a> {
         Residuals::of(&self.knots, posterior, reference, slot, quantity, samples)
     }
 
-    fn reweigh(&mut self, stage: Stage) {
+    fn reweigh(&mut self) {
         let Some(posterior) = self.posterior.take() else { return };
         for source in 0..self.sources.len() {
             for quantity in Quantity::ALL {
                 let residuals = self.residuals(&posterior, source, quantity);
                 let level = &mut self.levels[source][quantity as usize];
                 let weights = &mut self.weights[source][quantity as usize];
-                match stage {
-                    Stage::First => level.first_weights(&residuals, weights),
-                    Stage::Mixture => {
+                match self.stage {
+                    Stage::First if self.settings.robust => level.first_weights(&residuals, weights),
+                    Stage::First => level.step(&residuals, weights, false),
+                    Stage::Mixture { .. } => {
                         level.step(&residuals, weights, self.settings.robust);
                         level.correlate(&residuals, weights);
                     }
@@ -303,6 +330,15 @@ impl<'a> Fit<'a> {
             }
         }
         self.posterior = Some(posterior);
+    }
+
+    /// Whether the last step moved no clock offset by much.
+    fn clocks_rest(&self) -> bool {
+        let Some(posterior) = &self.posterior else { return false };
+        self.relaxations.iter().enumerate().all(|(slot, relaxation)| {
+            let i = index(slot, Kind::ClockOffset, 0);
+            relaxation.last.abs() <= AT_REST * posterior.covariance[(i, i)].sqrt()
+        })
     }
 
     fn is_settled(&self, before: Option<&[f64]>, levels: &[[Level; 2]]) -> bool {

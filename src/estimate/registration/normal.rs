@@ -15,6 +15,9 @@ const ACTIVE: usize = 12;
 pub(super) struct Weighted<'a> {
     /// Index of the source.
     pub(super) source: usize,
+    /// The block of columns that its rows add to: a source's own, or any other's for the datum, whose columns are
+    /// zero but for the value.
+    pub(super) block: usize,
     pub(super) quantity: Quantity,
     pub(super) samples: &'a [Sample],
     /// What 1/sigma^2 is multiplied by, one a sample.
@@ -31,9 +34,9 @@ pub(super) struct Weighted<'a> {
 pub(super) struct Normal {
     /// A by axis; a single one where the axes' weights agree.
     grams: Vec<Banded>,
-    /// B by axis and source.
+    /// B by axis and block.
     pub(super) border: [Vec<Vec<[f64; COLUMNS]>>; 3],
-    /// D by axis and source: rows of two sources have no unknowns in common.
+    /// D by axis and block: rows of two sources have no unknowns in common.
     pub(super) corner: [Vec<[[f64; COLUMNS]; COLUMNS]>; 3],
     /// Sum of the logarithms of all rows' weights, 1/sigma^2 included, over the axes.
     pub(super) log_weights: f64,
@@ -89,11 +92,12 @@ impl Kernel for Assembly<'_> {
         let Self { knots, series, references, coefficients } = self;
         let isotropic = |s: &Sample| s.sigma[0] == s.sigma[1] && s.sigma[0] == s.sigma[2];
         let agree = series.iter().all(|s| s.samples.iter().all(isotropic));
-        let (n, sources) = (knots.count(), references.len());
+        let n = knots.count();
+        let blocks = series.iter().map(|s| s.block + 1).max().unwrap_or(0);
         let mut normal = Normal {
             grams: vec![Banded::zeros(n, knots.half_bandwidth()); if agree { 1 } else { 3 }],
-            border: std::array::from_fn(|_| vec![vec![[0.0; COLUMNS]; n]; sources]),
-            corner: std::array::from_fn(|_| vec![[[0.0; COLUMNS]; COLUMNS]; sources]),
+            border: std::array::from_fn(|_| vec![vec![[0.0; COLUMNS]; n]; blocks]),
+            corner: std::array::from_fn(|_| vec![[[0.0; COLUMNS]; COLUMNS]; blocks]),
             log_weights: 0.0,
             rows: 0,
         };
@@ -104,7 +108,7 @@ impl Kernel for Assembly<'_> {
             for (sample, &weight) in part.samples.iter().zip(part.weights) {
                 knots.evaluate(reference.time_s(sample.time_s), &mut active);
                 if active.first != patch.first {
-                    patch.flush(&mut normal, part.source);
+                    patch.flush(&mut normal, part.block);
                     patch.first = active.first;
                 }
                 let motion = motion(coefficients, &active, reference.centre);
@@ -115,12 +119,12 @@ impl Kernel for Assembly<'_> {
                 let weights = reference.sigma(sample).map(|s| weight / (s * s));
                 patch.add(&b, &row.columns, weights, agree);
                 for axis in 0..3 {
-                    add_product(&mut normal.corner[axis][part.source], &row.columns[axis], weights[axis]);
+                    add_product(&mut normal.corner[axis][part.block], &row.columns[axis], weights[axis]);
                     normal.log_weights += weights[axis].ln();
                 }
                 normal.rows += 3;
             }
-            patch.flush(&mut normal, part.source);
+            patch.flush(&mut normal, part.block);
         }
         normal
     }
@@ -167,13 +171,13 @@ impl Patch {
         }
     }
 
-    fn flush(&mut self, normal: &mut Normal, source: usize) {
+    fn flush(&mut self, normal: &mut Normal, block: usize) {
         for (gram, patch) in normal.grams.iter_mut().zip(&mut self.grams) {
             gram.add_block(self.first, patch);
             patch.as_flattened_mut().fill(0.0);
         }
         for (border, patch) in normal.border.iter_mut().zip(&mut self.border) {
-            let rows = border[source].iter_mut().skip(self.first);
+            let rows = border[block].iter_mut().skip(self.first);
             for (to, from) in rows.zip(patch.iter()) {
                 (0..COLUMNS).for_each(|j| to[j] += from[j]);
             }

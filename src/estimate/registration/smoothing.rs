@@ -43,14 +43,14 @@ pub(super) fn likeliest_lambda(
     unit * 10.0_f64.powf(found.x)
 }
 
-/// Source, column and prior sigma of each unknown that acts on `axis`.
+/// Block, column and prior sigma of each unknown that acts on `axis`.
 fn own_unknowns(layout: &Layout, variances: &[f64], axis: usize) -> Vec<(usize, usize, f64)> {
     let mut own = Vec::new();
-    for (slot, &source) in layout.slots.iter().enumerate() {
+    for slot in 0..layout.slots.len() {
         for column in 0..OF_AN_AXIS {
             let wanted = index(slot, Kind::ALL[column], axis);
             if let Ok(place) = layout.active.binary_search(&wanted) {
-                own.push((source, column, variances[place].sqrt()));
+                own.push((slot, column, variances[place].sqrt()));
             }
         }
     }
@@ -73,10 +73,10 @@ fn deviance(
             half
         })
         .collect();
-    let sources = halves.len();
-    let mut blocks = vec![vec![[[0.0; COLUMNS]; COLUMNS]; sources]; sources];
-    for i in 0..sources {
-        for j in i..sources {
+    let count = halves.len();
+    let mut blocks = vec![vec![[[0.0; COLUMNS]; COLUMNS]; count]; count];
+    for i in 0..count {
+        for j in i..count {
             let corner = (i == j).then_some(&normal.corner[axis][i]);
             blocks[i][j] = complement(corner, &halves[i], &halves[j]);
             blocks[j][i] = std::array::from_fn(|a| std::array::from_fn(|b| blocks[i][j][b][a]));
@@ -89,7 +89,7 @@ fn deviance(
     });
     let score = DVector::from_fn(k, |i, _| {
         let (s, a, p) = own[i];
-        p * (0..sources).map(|t| blocks[s][t][a][VALUE]).sum::<f64>()
+        p * (0..count).map(|t| blocks[s][t][a][VALUE]).sum::<f64>()
     });
     let residual: f64 = blocks.iter().flatten().map(|block| block[VALUE][VALUE]).sum();
     let border = precision.cholesky()?;
