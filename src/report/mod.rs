@@ -7,6 +7,7 @@ pub mod csv;
 mod export;
 pub mod inspection;
 mod proposal;
+mod registration;
 mod text;
 
 pub use comparison::{
@@ -16,6 +17,7 @@ pub use comparison_text::render_comparison;
 pub use export::ExportReport;
 pub use inspection::render_inspection;
 pub use proposal::InitReport;
+pub use registration::{NoiseReport, RegistrationReport, RejectedReport, UnknownReport};
 pub use text::render;
 
 use schemars::JsonSchema;
@@ -24,7 +26,7 @@ use serde::Serialize;
 use crate::estimate::coverage;
 use crate::estimate::extrapolation::LawKind;
 use crate::fusion::{Fusion, Plan, TriedLaw};
-use crate::sample::Quantity;
+use crate::sample::{Quantity, Source};
 use crate::source::{Candidate, Loaded};
 use crate::time::Time;
 use crate::track::Phase;
@@ -48,7 +50,9 @@ pub struct Report {
     pub track: TrackReport,
     /// The track phase by phase.
     pub phases: Vec<PhaseReport>,
-    /// How the sources differ where they overlap.
+    /// The sources' errors against the datum, where they were registered.
+    pub registration: Option<RegistrationReport>,
+    /// How the sources differ where they overlap: what is left after the registration, if there was one.
     pub disagreements: Vec<DisagreementReport>,
     /// What SFF chose.
     pub spline: Option<SplineReport>,
@@ -295,6 +299,10 @@ impl Report {
                     velocity_sigma_m_s: known(p.sigma[Quantity::Velocity as usize]),
                 })
                 .collect(),
+            registration: fusion.registered.as_ref().map(|found| {
+                let sources: Vec<&Source> = loaded.iter().map(|l| &l.source).collect();
+                RegistrationReport::new(found, &sources, since_t0)
+            }),
             disagreements: fusion
                 .disagreements
                 .iter()

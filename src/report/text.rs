@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Write};
 
-use super::{ExtrapolationReport, Report};
+use super::{ExtrapolationReport, Report, registration};
 use crate::printable::printable;
 
 /// The report as text. It doesn't name the files, which may change without the track changing.
@@ -34,6 +34,13 @@ fn write_page(out: &mut String, report: &Report) -> fmt::Result {
         write!(out, ", frame {:?}", track.frame_id)?;
     }
     writeln!(out)?;
+    if let Some(registration) = &report.registration {
+        writeln!(
+            out,
+            "        registered to the datum in {} steps, {} knots",
+            registration.iterations, registration.knots
+        )?;
+    }
     if let Some(spline) = &report.spline {
         let [x, y, z] = spline.noise_scale;
         writeln!(
@@ -46,6 +53,10 @@ fn write_page(out: &mut String, report: &Report) -> fmt::Result {
         extrapolation(out, e, track.rate_hz)?;
     }
     writeln!(out)?;
+    if let Some(found) = &report.registration {
+        registration::write(out, found)?;
+        writeln!(out)?;
+    }
     phases(out, report)?;
     if !report.characteristic_points.is_empty() {
         writeln!(out)?;
