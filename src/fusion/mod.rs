@@ -147,16 +147,13 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
     let pieces = fit_pieces(sources, &coverage, plan, curve.as_ref(), &mut warnings)?;
 
     let disagreements = agreement::compare(sources, &coverage);
-    let bands = match &registered {
-        Some(registered) => {
-            registered::warn(sources, registered, &disagreements, &mut warnings);
-            Bands::Registered { registered, is_track: plan.is_registered_spline() }
-        }
-        None => {
-            warn_of_disagreement(sources, &disagreements, &mut warnings);
-            warn_of_misfit(&pieces, &disagreements, &mut warnings);
-            Bands::Unregistered(Unregistered::of(sources, &coverage, &disagreements, plan))
-        }
+    let bands = if let Some(registered) = &registered {
+        registered::warn(sources, registered, &disagreements, &mut warnings);
+        Bands::Registered { registered, is_track: plan.is_registered_spline() }
+    } else {
+        warn_of_disagreement(sources, &disagreements, &mut warnings);
+        warn_of_misfit(&pieces, &disagreements, &mut warnings);
+        Bands::Unregistered(Unregistered::of(sources, &coverage, &disagreements, plan))
     };
 
     let mut points = Vec::new();
