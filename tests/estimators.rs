@@ -27,6 +27,7 @@ fn plan(method: Estimator, coefficients: Coefficients) -> Plan {
         knot_spacing_s: None,
         order: 8,
         window_points: 5,
+        registration: None,
         bridge_max_s: 5.0,
         extrapolation: Some(
             extrapolation::Settings { laws: // of an acceleration that stays, as that of the parabola below

@@ -116,7 +116,10 @@ mod tests {
                 "position_sigma_m is -1.0",
             ),
             ("[[characteristic_point]]\nname = \"exit\"\nz_m = inf", "z_m is inf"),
-            ("[fusion]\nestimate = [\"bias\"]", "fusion.estimate is [bias], expected \"auto\" or []"),
+            (
+                "[registration]\nclock_offset_s = -1.0",
+                "registration's clock offset is -1.0, expected a positive number",
+            ),
         ] {
             let error = parse(text).expect_err(text).to_string();
             assert!(error.contains(part), "{text}: {error}");

@@ -133,8 +133,7 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
     let mut registered = None;
     let corrected;
     let mut sources = sources;
-    if let Some(settings) = &plan.registration {
-        let (kept, found) = register_pieces(sources, plan, settings)?;
+    if let Some((kept, found)) = register_pieces(sources, plan, &mut warnings)? {
         corrected = found.corrected(&kept);
         sources = &corrected;
         registered = Some(found);
@@ -272,7 +271,7 @@ fn carry_on(
         above = plan.stop_z_m.is_some_and(|stop| p.state.position[2] >= stop);
         go_on
     };
-    let times = grid(start_s, piece.to_s + horizon_s, plan.rate_hz).filter(|&t| t > piece.to_s);
+    let times = grid(start_s, piece.to_s + horizon_s, plan.rate_hz).skip(1);
     times.map_while(point).take_while(below).collect()
 }
 
@@ -300,7 +299,8 @@ fn events(track: &Track, plan: &Plan, warnings: &mut Vec<String>) -> Vec<Charact
 
 /// Instants from `from_s` on, `1 / rate_hz` apart, up to `to_s`.
 fn grid(from_s: f64, to_s: f64, rate_hz: f64) -> impl Iterator<Item = f64> {
-    let count = ((to_s - from_s) * rate_hz + 1e-6).floor().max(0.0) as usize;
+    // a last sample that a clock offset moved by microseconds still counts
+    let count = ((to_s - from_s) * rate_hz + 1e-3).floor().max(0.0) as usize;
     (0..=count).map(move |i| (from_s + i as f64 / rate_hz).min(to_s))
 }
 

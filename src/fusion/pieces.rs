@@ -11,6 +11,7 @@ use crate::estimate::registration::RegisteredCurve;
 use crate::estimate::weighted_mean::WeightedMean;
 use crate::estimate::{polynomial, spline};
 use crate::sample::{Quantity, Source};
+use crate::time::Time;
 use crate::track::{Curve, State};
 
 /// A fitted piece.
@@ -52,12 +53,7 @@ pub(super) fn fit_pieces(
         _ => {}
     }
     if let Some(at) = lost_at {
-        warnings.push(format!(
-            "left out: {lost_samples} {} more than {} s away from all others, too few to fit, the first at {at} \
-             (wrong stamps?)",
-            if lost_samples == 1 { "sample" } else { "samples" },
-            plan.bridge_max_s
-        ));
+        warn_of_lost(lost_samples, at, plan, warnings);
     }
     if fitted.len() > 1 {
         let longest = fitted.windows(2).map(|w| w[1].from_s - w[0].to_s).fold(0.0, f64::max);
@@ -69,6 +65,16 @@ pub(super) fn fit_pieces(
         ));
     }
     Ok(fitted)
+}
+
+/// Warns of samples that stand alone.
+pub(super) fn warn_of_lost(lost_samples: usize, first: Time, plan: &Plan, warnings: &mut Vec<String>) {
+    warnings.push(format!(
+        "left out: {lost_samples} {} more than {} s away from all others, too few to fit, the first at {first} \
+         (wrong stamps?)",
+        if lost_samples == 1 { "sample" } else { "samples" },
+        plan.bridge_max_s
+    ));
 }
 
 type Fitted = (Box<dyn Curve>, Option<SplineSummary>);

@@ -1,22 +1,25 @@
 //! Sources registered to the datum, and what a person must read of it.
 
 use super::Plan;
-use super::pieces::instants;
-use crate::estimate::agreement::Disagreement;
+use super::pieces::{instants, warn_of_lost};
+use crate::estimate::agreement::{self, Disagreement};
 use crate::estimate::coverage::Coverage;
-use crate::estimate::registration::{Kind, Registered, Separation, Settings, register};
+use crate::estimate::registration::{Kind, Registered, Separation, register};
 use crate::estimate::{EstimateError, spline};
 use crate::sample::{Quantity, Source};
 use crate::track::{Curve, State};
 
-/// Registers what can be fitted of `sources`: the samples of the pieces that have enough of them.
+/// Registers what can be fitted of `sources`: the samples of the pieces that have enough of them; `None` where
+/// there is no such piece, or nothing is to be registered.
 pub(super) fn register_pieces(
     sources: &[Source],
     plan: &Plan,
-    settings: &Settings,
-) -> Result<(Vec<Source>, Registered), EstimateError> {
+    warnings: &mut Vec<String>,
+) -> Result<Option<(Vec<Source>, Registered)>, EstimateError> {
+    let Some(settings) = &plan.registration else { return Ok(None) };
     let (mut kept, mut pieces): (Vec<Source>, Vec<(f64, f64)>) =
         (sources.iter().map(|s| Source { name: s.name.clone(), ..Source::default() }).collect(), Vec::new());
+    let (mut lost_samples, mut lost_at) = (0, None);
     for (from_s, to_s) in Coverage::of(sources).pieces(plan.bridge_max_s) {
         let inside: Vec<Source> = sources.iter().map(|s| s.within(from_s, to_s)).collect();
         if instants(&inside) >= spline::MIN_SAMPLES && inside.iter().any(|s| !s.positions.is_empty()) {
@@ -25,10 +28,19 @@ pub(super) fn register_pieces(
                 all.positions.extend(part.positions);
                 all.velocities.extend(part.velocities);
             }
+        } else {
+            lost_samples += inside.iter().map(Source::len).sum::<usize>();
+            lost_at.get_or_insert(plan.origin.plus_seconds(from_s));
         }
     }
+    if pieces.is_empty() {
+        return Ok(None);
+    }
+    if let Some(first) = lost_at {
+        warn_of_lost(lost_samples, first, plan, warnings);
+    }
     let registered = register(&kept, plan.datum, &pieces, settings)?;
-    Ok((kept, registered))
+    Ok(Some((kept, registered)))
 }
 
 /// A state whose curve doesn't know what the registration leaves open: that of the registered curve at the nearest
@@ -47,6 +59,9 @@ pub(super) fn widened(mut state: State, time_s: f64, registered: &Registered) ->
 
 /// An unknown that keeps more than this share of its prior sigma, and can't be told from another, is worth a warning.
 const UNKNOWN: f64 = 0.5;
+
+/// Noise this many times what was stated means that something is wrong with one or the other.
+const MISFIT: f64 = 3.0;
 
 /// Warns of what the registration can't tell, and of what it leaves.
 pub(super) fn warn(
@@ -90,6 +105,23 @@ pub(super) fn warn(
                 ));
             }
         }
+    }
+    for (s, q) in (0..sources.len()).flat_map(|s| Quantity::ALL.map(|q| (s, q))) {
+        let scale = registered.noise[s][q as usize].scale;
+        if scale > MISFIT && !sources[s].series(q).is_empty() {
+            warnings.push(format!(
+                "the {} of {} lies {scale:.1} times its sigmas from the track (root mean square): sigmas that are too small, \
+                 or an error that the model doesn't hold; the bands are widened by that factor",
+                q.name(),
+                sources[s].name
+            ));
+        }
+    }
+    for (first, second) in agreement::uncompared(sources, left, Quantity::Position) {
+        warnings.push(format!(
+            "{} and {} never measure position at the same time: what they differ by rests on the track between them",
+            sources[first].name, sources[second].name
+        ));
     }
     for d in left.iter().filter(|d| d.is_significant()) {
         let (first, second) = (&sources[d.sources.0].name, &sources[d.sources.1].name);

@@ -26,13 +26,17 @@ fn exit_code_0_for_one_sensor_and_the_summary_says_that_it_is_alone() {
 }
 
 #[test]
-fn exit_code_3_for_sensors_that_disagree_and_the_warning_says_who_and_by_how_much() {
+fn exit_code_3_for_sensors_that_disagree_unregistered_and_the_warning_says_who_and_by_how_much() {
     let mut log = TrialLog::new();
     log.sensor("/tether/track", &Sensor::new(0.0, 8.0, 1));
     log.sensor("/beacon/track", &Sensor { bias_m: [2.0, 0.0, 0.0], ..Sensor::new(5.0, 13.0, 2) });
-    let ran = Trial::of(log.finish()).fuse(&[]);
+    let log = log.finish();
+    let ran = Trial::of(&log).config("[fusion]\nestimate = []\n").fuse(&[]);
     assert_eq!(ran.code, 3);
     assert_says(&ran.stderr, &["warning: ", "beacon", "tether", "disagree in position", "m"]);
+    let ran = Trial::of(&log).fuse(&[]);
+    assert_eq!((ran.code, ran.stderr.as_str()), (0, ""), "registered, they agree");
+    assert_says(&ran.stdout, &["errors of", "bias", "clock offset"]);
 }
 
 #[test]
@@ -99,7 +103,7 @@ fn exit_code_2_for_a_config_that_is_wrong_and_the_message_says_where() {
         ("[fusion]\norder = 0\n", &["fusion.order is 0, expected 1 to 48"]),
         ("[output]\nprefix = \"fused\"\n", &["output.prefix is \"fused\", expected \"/name\""]),
         ("[source]\nname = \"a\"\n", &["trial.toml: line 1", "list of tables", "hint: two brackets"]),
-        ("[fusion]\nestimate = \"al\"\n", &["trial.toml: line 2: expected \"auto\" or []"]),
+        ("[fusion]\nestimate = \"al\"\n", &["trial.toml: line 2: expected \"auto\", [], or a list"]),
     ];
     for (text, parts) in cases {
         assert_says(&Trial::of(two_sensors()).config(text).error(2), parts);

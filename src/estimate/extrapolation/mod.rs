@@ -180,8 +180,8 @@ pub fn best<'a>(candidates: impl IntoIterator<Item = &'a Extrapolation>) -> Opti
     candidates.into_iter().reduce(|best, next| if off(next) < off(best) { next } else { best })
 }
 
-/// The density q of greatest likelihood on one axis, m^2/s^3: the median over the origins, since a trial that was
-/// surprised by the end of a thrust says nothing of what comes.
+/// The density q of greatest likelihood on one axis, m^2/s^3: the upper quartile over the origins, since a
+/// trial or two that were surprised by the end of a thrust say nothing of what comes.
 fn density(misses: &[Miss], axis: usize) -> f64 {
     let of_origin = |misses: &[Miss]| {
         let cost = |exponent: f64| {
@@ -203,7 +203,7 @@ fn density(misses: &[Miss], axis: usize) -> f64 {
         10.0_f64.powf(scalar::minimise(-8.0, 6.0, 28, 0.01, cost).x)
     };
     let mut densities: Vec<f64> = misses.chunk_by(|a, b| a.origin == b.origin).map(of_origin).collect();
-    robust::median(&mut densities).unwrap_or(0.0)
+    robust::quantile(&mut densities, 0.75).unwrap_or(0.0)
 }
 
 fn holdout(misses: &[Miss]) -> Holdout {
