@@ -61,7 +61,8 @@ fn check(families: &[Family]) {
 
 #[test]
 fn registered_sources_give_centimetres_and_bands_that_hold() {
-    let families = trackfuse::simulate::FAMILIES.map(|name| Family::judge(name, climbs::simulated(name, 8)));
+    let families =
+        trackfuse::simulate::FAMILIES.map(|name| Family::judge(name, climbs::simulated(name, 1, 8)));
     check(&families);
 }
 

@@ -26,10 +26,10 @@ fn sample(time_s: f64, value: [f64; 3]) -> Sample {
     Sample { time_s, value, sigma: [1e-6; 3] }
 }
 
-/// `runs` climbs of a family, with seeds from 1 on.
-pub(crate) fn simulated(family: &str, runs: u64) -> impl Iterator<Item = Climb> {
+/// `runs` climbs of a family, with seeds from `first_seed` on.
+pub(crate) fn simulated(family: &str, first_seed: u64, runs: u64) -> impl Iterator<Item = Climb> {
     let family = family.to_owned();
-    (1..=runs).map(move |seed| {
+    (first_seed..first_seed + runs).map(move |seed| {
         let mut scenario = Scenario::family(&family).expect("a known family");
         scenario.seed = seed;
         scenario.recording.bystanders = false;

@@ -23,6 +23,9 @@ struct Arguments {
     /// Runs a family
     #[arg(long, default_value_t = 200)]
     runs: u64,
+    /// Seed of the first run
+    #[arg(long, default_value_t = 1)]
+    first_seed: u64,
     /// A folder of `FAMILY_K.mcap` with `.truth.csv` and `.truth.json`, instead of simulating
     #[arg(long)]
     climbs: Option<PathBuf>,
@@ -34,7 +37,7 @@ fn main() {
         .iter()
         .map(|name| match &arguments.climbs {
             Some(folder) => Family::judge(name, climbs::recorded(folder, name)),
-            None => Family::judge(name, climbs::simulated(name, arguments.runs)),
+            None => Family::judge(name, climbs::simulated(name, arguments.first_seed, arguments.runs)),
         })
         .collect();
     print!("{}", tables::render(&families));
