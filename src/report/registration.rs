@@ -145,19 +145,24 @@ fn in_words(name: Name, source: &str) -> String {
     format!("{source}'s {}{axis}", name.kind.name())
 }
 
+/// An error that is less probable than this is not shown as one.
+const NO_SIGN: f64 = 0.05;
+
 /// A line a source and kind, with the verdicts; then the noise.
 pub(super) fn write(out: &mut String, report: &RegistrationReport) -> fmt::Result {
-    if !report.unknowns.is_empty() {
+    if report.unknowns.iter().any(|u| u.probability >= NO_SIGN) {
         writeln!(
             out,
             "{:<22} {:<14} {:<62} {:<4} is there  data tell",
             "errors of", "", "value ± sigma", ""
         )?;
     }
-    let same = |a: &UnknownReport, b: &UnknownReport| (&a.source, a.kind) == (&b.source, b.kind);
+    let there = |u: &&UnknownReport| u.probability >= NO_SIGN;
+    let shown: Vec<&UnknownReport> = report.unknowns.iter().filter(there).collect();
+    let same = |a: &&UnknownReport, b: &&UnknownReport| (&a.source, a.kind) == (&b.source, b.kind);
     let mut before = "";
-    for kind in report.unknowns.chunk_by(same) {
-        let first = &kind[0];
+    for kind in shown.chunk_by(same) {
+        let first = kind[0];
         let values: Vec<String> =
             kind.iter().map(|u| format!("{} ± {}", signed(u.value), digits(u.sigma))).collect();
         let verdicts: Vec<&str> = kind.iter().map(|u| u.separation.as_str()).collect();
@@ -181,6 +186,16 @@ pub(super) fn write(out: &mut String, report: &RegistrationReport) -> fmt::Resul
             100.0 * first.probability
         )?;
         before = &first.source;
+    }
+    let mut absent: Vec<String> = Vec::new();
+    for u in report.unknowns.iter().filter(|u| !there(u)) {
+        let text = format!("{}'s {}", printable(&u.source), u.kind.name());
+        if !absent.contains(&text) {
+            absent.push(text);
+        }
+    }
+    if !absent.is_empty() {
+        writeln!(out, "no sign of: {}", absent.join(", "))?;
     }
     let noise = report.noise.iter().map(|n| {
         let rejected = if n.rejected > 0 {
