@@ -35,11 +35,8 @@ fn write_page(out: &mut String, report: &Report) -> fmt::Result {
     }
     writeln!(out)?;
     if let Some(registration) = &report.registration {
-        writeln!(
-            out,
-            "        registered to the datum in {} steps, {} knots",
-            registration.iterations, registration.knots
-        )?;
+        let what = if report.sources.len() > 1 { "registered to the datum" } else { "smoothed" };
+        writeln!(out, "        {what} in {} steps, {} knots", registration.iterations, registration.knots)?;
     }
     if let Some(spline) = &report.spline {
         let [x, y, z] = spline.noise_scale;
