@@ -33,13 +33,18 @@ pub fn median_step_s(series: &[Sample]) -> Option<f64> {
     robust::median(&mut steps)
 }
 
+/// The longest step of a series that is no outage, across which it may be interpolated, s; 0 of too few samples.
+#[must_use]
+pub fn max_gap_s(series: &[Sample]) -> f64 {
+    median_step_s(series).map_or(0.0, |step| OUTAGE_INTERVALS * step)
+}
+
 impl Coverage {
     /// The runs of each source; a longer silence than ten median intervals ends one.
     #[must_use]
     pub fn of(sources: &[Source]) -> Self {
-        let of_series = |series: &[Sample]| median_step_s(series).map_or(0.0, |step| OUTAGE_INTERVALS * step);
         let outage_s: Vec<[f64; 2]> =
-            sources.iter().map(|s| Quantity::ALL.map(|q| of_series(s.series(q)))).collect();
+            sources.iter().map(|s| Quantity::ALL.map(|q| max_gap_s(s.series(q)))).collect();
         let runs =
             sources.iter().zip(&outage_s).map(|(source, outage)| runs(source, densest(outage))).collect();
         Self { runs, outage_s }

@@ -11,7 +11,7 @@ use super::BAND_SIGMAS;
 use super::errors::{Deviation, Errors, errors};
 use super::interpolation::{Interpolated, linear_error};
 use crate::estimate::characteristic_point::{CharacteristicPoint, Height, first_crossing};
-use crate::estimate::coverage::{self, OUTAGE_INTERVALS, interpolate};
+use crate::estimate::coverage::{self, OUTAGE_INTERVALS, interpolate, max_gap_s};
 use crate::sample::{Quantity, Sample, Source, slice};
 use crate::time::Time;
 use crate::track::{Method, Phase, State, Track, TrackPoint};
@@ -173,11 +173,6 @@ fn as_source(track: &Track, t0: Time) -> Source {
         positions: series(|s| s.position, |s| s.position_sigma),
         velocities: series(|s| s.velocity, |s| s.velocity_sigma),
     }
-}
-
-/// The longest step of a series across which it is interpolated, s.
-fn max_gap_s(series: &[Sample]) -> f64 {
-    coverage::median_step_s(series).map_or(0.0, |step| OUTAGE_INTERVALS * step)
 }
 
 /// What the estimate says less what the reference says, at the instants of the one that has fewer of them.

@@ -8,7 +8,7 @@ use super::SourceError;
 use super::candidate::of_topic;
 use super::load::{Loaded, load};
 use crate::config::{SourceConfig, TimeChoice};
-use crate::estimate::coverage::{self, OUTAGE_INTERVALS, interpolate};
+use crate::estimate::coverage::{interpolate, max_gap_s};
 use crate::log::decode::{MessagePath, Step};
 use crate::log::{Log, LogError};
 use crate::sample::Sample;
@@ -261,7 +261,7 @@ fn topics_among(paths: impl IntoIterator<Item = Option<String>>) -> Vec<String> 
 fn foreign_track(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
     let (loaded, origin) = reference(log, &[topic.to_owned()], None)?;
     let velocities = &loaded.source.velocities;
-    let gap_s = coverage::median_step_s(velocities).map_or(0.0, |step| OUTAGE_INTERVALS * step);
+    let gap_s = max_gap_s(velocities);
     let unknown = [f64::NAN; 3];
     let point = |p: &Sample| TrackPoint {
         time: origin.plus_seconds(p.time_s),
