@@ -40,8 +40,10 @@ PRIORS = [(BIAS, 3.0), (DRIFT, 0.10), (VELOCITY_BIAS, 0.30), (OFFSET, 0.06), (SC
 START = [(POSITION, 0.3), (VELOCITY, 5.0), (ACCELERATION, 20.0)]
 FIRST = 15
 GATE_SIGMAS = 5.0
-# white jerk's density, m^2/s^5
-DENSITIES = 10.0 ** np.arange(-1.5, 4.01, 0.5)
+# white jerk's density, m^2/s^5: the first grid, and the steps about its best
+DENSITIES = 10.0 ** np.arange(-2.0, 4.1, 1.0)
+HALF, QUARTER = 10.0**0.5, 10.0**0.25
+COMPONENTS, AXES, PAIR = np.arange(6), np.arange(3), np.array([0, 3])
 # runs that go through the filter side by side
 BATCH = 50
 ROUNDS = 4
@@ -192,39 +194,42 @@ class Smoother:
             rows, variances, values = self.equations(x[r_of], r_of, steps.sample[k][r_of], free)
             xs, Ps = x[r_of], P[r_of]
             nu = values - np.matmul(rows, xs[:, :, None])[:, :, 0]
-            S = np.einsum("imj,imj->im", np.matmul(rows, Ps), rows) + variances
-            far = self.errors & (nu**2 > GATE_SIGMAS**2 * S).reshape(-1, 2, 3).any(axis=2)
-            for m in range(6):
-                h = rows[:, m]
-                Ph = np.matmul(Ps, h[:, :, None])[:, :, 0]
-                S = np.einsum("ij,ij->i", h, Ph) + variances[:, m]
-                nu = values[:, m] - np.einsum("ij,ij->i", h, xs)
-                good = ~far[:, m // 3]
-                K = Ph / S[:, None] * good[:, None]
-                likelihood[r_of, m % 3] -= 0.5 * np.where(good, nu**2 / S, GATE_SIGMAS**2) + 0.5 * np.log(S)
-                xs = xs + K * nu[:, None]
-                Ps = Ps - K[:, :, None] * Ph[:, None, :]
-                if smooth:
-                    updates.append((r_of, h, K, nu / S, good))
-            x[r_of], P[r_of] = xs, 0.5 * (Ps + Ps.transpose(0, 2, 1))
+            PH = np.matmul(Ps, rows.transpose(0, 2, 1))
+            S = np.matmul(rows, PH)
+            S[:, COMPONENTS, COMPONENTS] += variances
+            far = (nu**2 > GATE_SIGMAS**2 * S[:, COMPONENTS, COMPONENTS]).reshape(-1, 2, 3).any(axis=2)
+            far = np.repeat(far & self.errors, 3, axis=1)
+            S[:, COMPONENTS, COMPONENTS] += np.where(far, 1e9, 0.0)
+            inverse = np.linalg.inv(S)
+            weighted = np.matmul(inverse, nu[:, :, None])[:, :, 0]
+            # with offset and scale fixed the axes have nothing in common
+            pairs = S[:, AXES[:, None, None] + PAIR[:, None], AXES[:, None, None] + PAIR]
+            cost = np.where(far, GATE_SIGMAS**2, nu * weighted).reshape(-1, 2, 3).sum(axis=1)
+            rejected = far.reshape(-1, 2, 3).sum(axis=1)
+            likelihood[r_of] -= 0.5 * (cost + np.log(np.linalg.det(pairs)) - rejected * np.log(1e9))
+            K = np.matmul(PH, inverse)
+            if smooth:
+                updates.append((r_of, rows, K, weighted))
+            x[r_of] = xs + np.matmul(K, nu[:, :, None])[:, :, 0]
+            Ps = Ps - np.matmul(K, PH.transpose(0, 2, 1))
+            P[r_of] = 0.5 * (Ps + Ps.transpose(0, 2, 1))
         if not smooth:
             return likelihood, None, None
         smoothed = np.empty((steps.count, count, self.states))
         adjoint = np.zeros((count, self.states))
         for k in reversed(range(steps.count)):
             dt, x, P, updates = history[k]
-            for r_of, h, K, scaled, good in reversed(updates):
-                own = adjoint[r_of]
-                own = own - h * np.einsum("ij,ij->i", K, own)[:, None] - h * (scaled * good)[:, None]
-                adjoint[r_of] = own
+            for r_of, rows, K, weighted in updates:
+                own = adjoint[r_of][:, :, None]
+                back = np.matmul(K.transpose(0, 2, 1), own)[:, :, 0] + weighted
+                adjoint[r_of] -= np.matmul(rows.transpose(0, 2, 1), back[:, :, None])[:, :, 0]
             smoothed[k] = x - np.matmul(P, adjoint[:, :, None])[:, :, 0]
             retreat(adjoint, dt)
         return likelihood, steps, smoothed
 
-    def best_density(self, about=None):
+    def best_density(self, about=None, step=DENSITIES[1] / DENSITIES[0]):
         """The density of greatest likelihood by run and axis: the best of a grid, or of three about the last, and a
         parabola through it."""
-        step = DENSITIES[1] / DENSITIES[0]
         shape = (len(self.runs), 3)
         grid = [np.full(shape, q) for q in DENSITIES] if about is None else [about / step, about, about * step]
         found = np.array([self.run(q, False, False)[0] for q in grid])
@@ -237,7 +242,8 @@ class Smoother:
     def smooth(self):
         """The track of each run at its instants: position and velocity."""
         if not self.errors:
-            return self.tracks(*self.run(self.best_density(), False, True)[1:])
+            density = self.best_density(self.best_density(self.best_density(), HALF), QUARTER)
+            return self.tracks(*self.run(density, False, True)[1:])
         density = np.full((len(self.runs), 3), 10.0)
         for turn in range(ROUNDS):
             _, steps, smoothed = self.run(density, True, True)
@@ -245,8 +251,10 @@ class Smoother:
             self.offset = self.offset + smoothed[-1, :, OFFSET]
             self.scale = self.scale + smoothed[-1, :, SCALE]
             self.linearise(steps, smoothed)
-            if 0 < turn < ROUNDS - 1:
-                density = self.best_density(density if turn > 1 else None)
+            if turn == 1:
+                density = self.best_density(self.best_density(), HALF)
+            elif turn == 2:
+                density = self.best_density(density, QUARTER)
         return tracks
 
     def linearise(self, steps, smoothed):
