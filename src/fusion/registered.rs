@@ -119,7 +119,9 @@ pub(super) fn warn(
     }
     for (first, second) in agreement::uncompared(sources, left, Quantity::Position) {
         warnings.push(format!(
-            "{} and {} never measure position at the same time: what they differ by rests on the track between them",
+            "{} and {} never measure position at the same time: nothing shows directly what they differ by, and the \
+             registration rests on a smooth track between them; the bands hold what that leaves open, an overlap \
+             would make them narrower",
             sources[first].name, sources[second].name
         ));
     }
