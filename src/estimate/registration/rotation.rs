@@ -68,9 +68,8 @@ fn level(v: [f64; 3]) -> [f64; 2] {
 
 /// The datum's and the source's vectors at the source's instants.
 fn pairs(from: &[Sample], to: &[Sample], offset_s: f64, max_gap_s: f64) -> Vec<Pair> {
-    let pair = |s: &Sample| {
-        Some((level(interpolate(from, s.time_s - offset_s, max_gap_s)?.value), level(s.value)))
-    };
+    let pair =
+        |s: &Sample| Some((level(interpolate(from, s.time_s - offset_s, max_gap_s)?.value), level(s.value)));
     to.iter().filter_map(pair).collect()
 }
 

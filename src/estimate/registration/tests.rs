@@ -316,7 +316,10 @@ fn a_source_that_the_others_contradict_is_not_believed_where_it_sees_alone() {
     assert!(found.noise[1][0].scale > 10.0, "{:?}", found.noise);
     for t in [6.5, 7.5, 8.5, 9.5] {
         let state = found.curve.at(t).expect("inside");
-        assert!((state.position[2] - winding(t).0[2]).abs() < 4.0 * state.position_sigma[2], "{t} s: {state:?}");
+        assert!(
+            (state.position[2] - winding(t).0[2]).abs() < 4.0 * state.position_sigma[2],
+            "{t} s: {state:?}"
+        );
     }
 }
 
