@@ -140,8 +140,8 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
     }
     let coverage = Coverage::of(sources);
     let curve = registered.as_mut().map(|r| {
-        r.curve = r.curve.clone().over(&coverage.pieces(plan.bridge_max_s));
-        Arc::new(r.curve.clone())
+        Arc::make_mut(&mut r.curve).cover(coverage.pieces(plan.bridge_max_s));
+        Arc::clone(&r.curve)
     });
     let pieces = fit_pieces(sources, &coverage, plan, curve.as_ref(), &mut warnings)?;
 
