@@ -87,12 +87,16 @@ pub(super) fn warn(
                     && u.sigma > UNKNOWN * u.prior_sigma
             })
         };
-        let together = registered.unknowns.iter().any(|u| {
+        let own = |kind: Kind| {
+            registered.unknowns.iter().filter(move |u| (u.name.source, u.name.kind) == (s, kind))
+        };
+        let clock_is_open = own(Kind::ClockOffset).any(|u| u.separation == Separation::AtPrior);
+        let together = own(Kind::Bias).any(|u| {
             let clock = |(other, _): (Name, f64)| (other.source, other.kind) == (s, Kind::ClockOffset);
-            (u.name.source, u.name.kind, u.separation) == (s, Kind::Bias, Separation::OnlyTogether)
+            u.separation == Separation::OnlyTogether
                 && u.strongest.is_some_and(clock)
                 && u.probability > LIKELY
-        });
+        }) && clock_is_open;
         if together {
             warnings.push(format!(
                 "the data don't separate the bias of {} from its clock offset: an overlap with the datum in which \

@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn a_tenth_of_samples_that_are_off_by_a_million_does_not_change_the_noise() {
-        let scaled = |i: usize| if i % 10 == 0 { [1e6; 3] } else { [[1.0; 3], [-1.0; 3]][i % 2] };
+        let scaled = |i: usize| if i.is_multiple_of(10) { [1e6; 3] } else { [[1.0; 3], [-1.0; 3]][i % 2] };
         let residuals = Residuals { scaled: (0..200).map(scaled).collect(), leverage: vec![[0.0; 3]; 200] };
         let (mut level, mut weights) = (Level::default(), vec![1.0; 200]);
         level.first_weights(&residuals, &mut weights);
