@@ -238,6 +238,7 @@ pub fn warnings_of(loaded: &[Loaded], shift_s: Option<f64>) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
+    use super::ExtrapolationMethod::{Auto, Drag, Pcf};
     use super::*;
 
     #[test]
@@ -248,7 +249,6 @@ mod tests {
             (found.choice, found.laws)
         };
         let plain = Law { kind: LawKind::Polynomial { order: 4, prior: None }, ..Law::POLYNOMIAL };
-        use ExtrapolationMethod::{Auto, Drag, Pcf};
         assert_eq!(asked(Pcf, true), (Choice::First, vec![Law::POLYNOMIAL, Law::DRAG]));
         assert_eq!(asked(Pcf, false), (Choice::First, vec![plain, Law::POLYNOMIAL, Law::DRAG]));
         assert_eq!(asked(Drag, true), (Choice::First, vec![Law::DRAG, Law::POLYNOMIAL]));

@@ -3,7 +3,7 @@
 //! Zhang 2025 fits an order-4 PCF to the last 46 samples and carries it 100 samples on. Plain least squares
 //! does that for a moment only: the errors of its jerk and snap grow with t^3 and t^4. With a [`Prior`]
 //! that lets the acceleration die away, as that of a body in water does, it holds several times longer. The other law
-//! is that body's own: constant force and quadratic drag. Either goes on from where the track ends (see [`transition`]);
+//! is that body's own: constant force and quadratic drag. Either goes on from where the track ends without a step;
 //! the paper's plain polynomial doesn't, as in the paper.
 //!
 //! The band. What a law gets wrong is the future acceleration. Take that as white noise of density q
