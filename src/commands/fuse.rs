@@ -30,7 +30,8 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     let log = Log::open(&args.log)?;
     let output = args.output.clone().unwrap_or_else(|| beside(&args.log));
     let channels = Topic::ALL.map(|topic| topic.channel(&config.output.prefix));
-    Appender::check(&log, &output, args.force, &channels)?;
+    let destination = crate::log::Destination::New { out: output.clone(), force: args.force };
+    Appender::check(&log, &destination, &channels)?;
 
     let named = !config.source.is_empty();
     let (unused, mut warnings) = choose_sources(&log, &mut config)?;
@@ -74,7 +75,7 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         surface_at_zero: config.output.surface_at_zero == Some(true),
         log_start: resolve::log_start(&log, shift_s),
     };
-    let mut appender = Appender::begin(&log, &output, args.force, &channels, config.output.compression)?;
+    let mut appender = Appender::begin(&log, &destination, &channels, config.output.compression)?;
     for message in messages(&fusion, context, &text, &warnings) {
         appender.write(crate::log::NewMessage {
             channel: message.topic as usize,
