@@ -18,6 +18,8 @@
 mod addition;
 mod append;
 mod chunk;
+#[cfg(test)]
+mod crash;
 pub mod decode;
 mod disk;
 mod error;

@@ -69,8 +69,11 @@ impl Undo {
             return Err(cannot(source));
         }
         if let Err(source) = disk::sync_folder(&path) {
-            let _ = disk::remove(&path);
-            return Err(cannot(source));
+            // Nothing is changed yet, so that it does no harm where it can't be removed.
+            return Err(match disk::remove(&path) {
+                Ok(()) => cannot(source),
+                Err(source) => LogError::NotPutBack { path: log.path.clone(), source },
+            });
         }
         Ok(undo)
     }
