@@ -12,7 +12,7 @@ use std::{
 
 use tempfile::{NamedTempFile, TempPath};
 
-use super::LogError;
+use super::{LogError, undo};
 use super::disk::{self, Step};
 use super::interrupt::{self, Writing};
 
@@ -193,6 +193,8 @@ pub(super) fn check_name(out: &Path, force: bool) -> Result<(), LogError> {
         // A device or a pipe would be replaced, not written to. A link is: what it leads to stays.
         Ok(found) if !found.is_file() && !found.is_symlink() => cannot("it is no regular file".into()),
         Ok(_) if !force => Err(LogError::OutputExists { path: path() }),
-        _ => Ok(()),
+        // What lies beside it is of this file.
+        Ok(_) => undo::refuse_pending(out),
+        Err(_) => Ok(()),
     }
 }
