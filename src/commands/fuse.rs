@@ -54,7 +54,8 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     let shift_s = resolve::log_time_shift_s(&loaded[datum]);
     warnings.extend(resolve::warnings_of(&loaded, shift_s));
     warnings.extend(fusion.warnings.iter().cloned());
-    let (input_name, output_name) = (args.log.display().to_string(), destination.path(&log).display().to_string());
+    let (input_name, output_name) =
+        (args.log.display().to_string(), destination.path(&log).display().to_string());
     let report = Report::new(&report::Parts {
         input: &input_name,
         output: &output_name,
@@ -87,8 +88,11 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     }
     appender.write_metadata(&metadata)?;
     appender.finish()?;
-    let files =
-        if args.in_place { format!("{input_name}, in place") } else { format!("{input_name} -> {output_name}") };
+    let files = if args.in_place {
+        format!("{input_name}, in place")
+    } else {
+        format!("{input_name} -> {output_name}")
+    };
     let text = format!("{files}\n\n{text}");
     say(args.voice, &text, &report, &warnings);
     Ok(if warnings.is_empty() { Outcome::Done } else { Outcome::Warned })

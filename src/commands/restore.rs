@@ -44,7 +44,13 @@ fn take_off(args: &Restore) -> Result<RestoreReport, CommandError> {
     Ok(report(args, &output, addition.original_len, false, counts))
 }
 
-fn report(args: &Restore, output: &Path, len: u64, half_done: bool, [off, left]: [usize; 2]) -> RestoreReport {
+fn report(
+    args: &Restore,
+    output: &Path,
+    len: u64,
+    half_done: bool,
+    [off, left]: [usize; 2],
+) -> RestoreReport {
     RestoreReport {
         version: env!("CARGO_PKG_VERSION").into(),
         log: args.log.display().to_string(),

@@ -94,11 +94,7 @@ impl<'a> Appender<'a> {
     ///
     /// # Errors
     /// As [`Appender::begin`], but for [`LogError::Write`] of a full or read-only disk.
-    pub fn check(
-        log: &Log,
-        destination: &Destination,
-        channels: &[NewChannel],
-    ) -> Result<(), LogError> {
+    pub fn check(log: &Log, destination: &Destination, channels: &[NewChannel]) -> Result<(), LogError> {
         checked(log, destination, channels).map(|_| ())
     }
 
@@ -358,7 +354,8 @@ mod tests {
         let out = dir.path().join("out.mcap");
         fs::write(&out, "precious").unwrap();
         // At the start, not after an hour of copying.
-        let refused = Appender::begin(&log, &Destination::new_file(&out), &[], Compression::Zstd).unwrap_err();
+        let refused =
+            Appender::begin(&log, &Destination::new_file(&out), &[], Compression::Zstd).unwrap_err();
         assert!(matches!(refused, LogError::OutputExists { .. }) && refused.hint().is_some(), "{refused}");
         assert_eq!(fs::read(&out).unwrap(), b"precious");
         assert_eq!(names_in(dir.path()), ["in.mcap", "out.mcap"]);
@@ -415,7 +412,8 @@ mod tests {
         let (dir, path) = on_disk(&log(chunked()));
         let log = Log::open(&path).unwrap();
         let out = dir.path().join("out.mcap");
-        let mut appender = Appender::begin(&log, &Destination::new_file(&out), &[channel("/x")], Compression::Zstd).unwrap();
+        let mut appender =
+            Appender::begin(&log, &Destination::new_file(&out), &[channel("/x")], Compression::Zstd).unwrap();
         let large = vec![b' '; 1_500_000];
         for i in 0..100_u64 {
             let data: &[u8] = if i < 10 { &large } else { b"1" };
@@ -439,7 +437,8 @@ mod tests {
         let log = Log::open(&path).unwrap();
         let out = dir.path().join("out.mcap");
         let channels = [channel("/x"), channel("/y")];
-        let mut appender = Appender::begin(&log, &Destination::new_file(&out), &channels, Compression::None).unwrap();
+        let mut appender =
+            Appender::begin(&log, &Destination::new_file(&out), &channels, Compression::None).unwrap();
         for i in 0..40 {
             // Not in the order of time, as messages of several channels may come.
             appender.write(NewMessage { channel: i % 2, time_ns: (i as u64 * 7) % 40, data: b"{}" }).unwrap();

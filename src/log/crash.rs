@@ -110,8 +110,7 @@ fn a_run_in_place_that_dies_at_any_step_leaves_the_original_or_what_gives_it_bac
     let mut pending = 0;
     for at in 0..steps.len() {
         trial.reset(&trial.original);
-        let (died, _) =
-            during(Some(Cut::From(at)), || add(&trial.path, "/x", &Destination::InPlace));
+        let (died, _) = during(Some(Cut::From(at)), || add(&trial.path, "/x", &Destination::InPlace));
         if !trial.is_pending() {
             let now = trial.now();
             assert!(now == trial.original || now == trial.added && died.is_ok(), "step {at}");
@@ -143,8 +142,7 @@ fn a_run_in_place_that_fails_at_any_step_puts_the_original_back_at_once() {
     let (_, steps) = during(None, || add(&trial.path, "/x", &Destination::InPlace));
     for at in 0..steps.len() {
         trial.reset(&trial.original);
-        let (failed, _) =
-            during(Some(Cut::Once(at)), || add(&trial.path, "/x", &Destination::InPlace));
+        let (failed, _) = during(Some(Cut::Once(at)), || add(&trial.path, "/x", &Destination::InPlace));
         // That the folder isn't synced at the very end is no failure.
         assert_eq!(failed.is_err(), at + 1 < steps.len(), "step {at}");
         assert!(trial.now() == if failed.is_err() { &trial.original[..] } else { &trial.added }, "step {at}");
@@ -157,8 +155,7 @@ fn an_appender_that_is_dropped_in_place_leaves_the_original() {
     let trial = Trial::new();
     let log = Log::open_in_place(&trial.path).unwrap();
     let channels = [NewChannel::json("/x", "trackfuse.Test", "{}")];
-    let mut appender =
-        Appender::begin(&log, &Destination::InPlace, &channels, Compression::None).unwrap();
+    let mut appender = Appender::begin(&log, &Destination::InPlace, &channels, Compression::None).unwrap();
     appender.write(NewMessage { channel: 0, time_ns: 1, data: &[b' '; 100_000] }).unwrap();
     appender.write(NewMessage { channel: 0, time_ns: u64::MAX, data: b"1" }).unwrap();
     assert!(trial.now() != trial.original && trial.is_pending());

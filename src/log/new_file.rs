@@ -12,9 +12,9 @@ use std::{
 
 use tempfile::{NamedTempFile, TempPath};
 
-use super::{LogError, undo};
 use super::disk::{self, Step};
 use super::interrupt::{self, Writing};
+use super::{LogError, undo};
 
 /// Names longer than this are shortened in the temporary's.
 const LONGEST_NAME: usize = 200;

@@ -54,8 +54,7 @@ impl Undo {
         data_end: u64,
         tail: At<'_>,
     ) -> Result<Self, LogError> {
-        let path =
-            beside(&log.path).map_err(|source| LogError::Write { path: log.path.clone(), source })?;
+        let path = beside(&log.path).map_err(|source| LogError::Write { path: log.path.clone(), source })?;
         let cannot = |source| LogError::Write { path: path.clone(), source };
         let part = disk::with_suffix(&path, "-part");
         if fs::symlink_metadata(&part).is_ok() {
@@ -104,7 +103,8 @@ impl Undo {
         let mut head = vec![0; HEAD_LEN.min(len) as usize];
         At::new(&file, 0).read_exact(&mut head).map_err(cannot)?;
         let numbers = head.strip_prefix(LINE).ok_or_else(|| bad("it is of another kind or version"))?;
-        let number = |at: usize| numbers.get(at..at + 8).and_then(|b| b.try_into().ok()).map(u64::from_le_bytes);
+        let number =
+            |at: usize| numbers.get(at..at + 8).and_then(|b| b.try_into().ok()).map(u64::from_le_bytes);
         let (Some(original_len), Some(data_end), Some(ends)) = (number(0), number(8), numbers.get(16..20))
         else {
             return Err(bad("it is cut off"));
@@ -153,7 +153,11 @@ impl Undo {
         for_each_piece(self.tail(), tail_len, |_, piece| {
             let mut written = vec![0; piece.len()];
             again.read_exact(&mut written)?;
-            if written == piece { Ok(()) } else { Err(io::Error::other("what was written reads back otherwise")) }
+            if written == piece {
+                Ok(())
+            } else {
+                Err(io::Error::other("what was written reads back otherwise"))
+            }
         })?;
         self.remove()
     }

@@ -123,7 +123,9 @@ fn crash_of_a_killed_run_costs_nobody_the_original() {
         assert!(read(&log) == original, "{crash}: the original is lost");
         assert!(!trial.path(UNDO).exists());
     }
-    println!("{crashes} killed: {cut_off} while the log was changed, {left} while a file was written, {done} too late");
+    println!(
+        "{crashes} killed: {cut_off} while the log was changed, {left} while a file was written, {done} too late"
+    );
     assert!(cut_off > 0 && left > 0, "no run was hit while it wrote");
 }
 

@@ -56,9 +56,11 @@ fn in_place_gives_the_log_that_a_new_file_would_be_and_restore_leads_back_from_b
     viewer_rules::assert_shown(&trial.path("in.mcap"));
 
     let schema: Value = serde_json::from_str(include_str!("../../schemas/restore.schema.json")).unwrap();
-    for (args, output) in
-        [(&["new.mcap"][..], "new.restored.mcap"), (&["new.mcap", "-o", "x"], "x"), (&["in.mcap", "--in-place"], "in.mcap")]
-    {
+    for (args, output) in [
+        (&["new.mcap"][..], "new.restored.mcap"),
+        (&["new.mcap", "-o", "x"], "x"),
+        (&["in.mcap", "--in-place"], "in.mcap"),
+    ] {
         let ran = run(&trial, &[&["restore", "--json"], args].concat());
         assert_eq!((ran.code, ran.stderr.as_str()), (0, ""));
         let report: Value = serde_json::from_str(&ran.stdout).unwrap();
@@ -166,7 +168,10 @@ fn after_a_run_was_cut_off_logs_are_not_read_until_restore_or_the_next_run_puts_
         assert_eq!(ran.code, 1, "{ran:#?}");
         assert_says(
             &ran.stderr,
-            &["\"in.mcap\" is not whole: a run that added to it was cut off", "hint: `trackfuse restore in.mcap`"],
+            &[
+                "\"in.mcap\" is not whole: a run that added to it was cut off",
+                "hint: `trackfuse restore in.mcap`",
+            ],
         );
         assert!(bytes(&trial, "in.mcap") == before);
     }
@@ -187,7 +192,10 @@ fn after_a_run_was_cut_off_logs_are_not_read_until_restore_or_the_next_run_puts_
         cut_off(&trial);
         let ran = run(&trial, &[&["fuse", "in.mcap"], way].concat());
         assert_eq!(ran.code, 0, "{ran:#?}");
-        assert_eq!(ran.stderr, "note: a run that added to in.mcap was cut off: in.mcap is as it was before that\n");
+        assert_eq!(
+            ran.stderr,
+            "note: a run that added to in.mcap was cut off: in.mcap is as it was before that\n"
+        );
         let expected = if way.len() == 1 { bytes(&trial, "new.mcap") } else { original.clone() };
         assert!(bytes(&trial, "in.mcap") == expected);
         assert_eq!(names(&trial), ["in.mcap", "new.mcap", "out.mcap"]);
@@ -250,7 +258,7 @@ fn a_sidecar_is_a_log_of_the_new_channels_alone() {
         library: format!("trackfuse {}", env!("CARGO_PKG_VERSION")),
     };
     let first = mcap::read::LinearReader::new(&sidecar).unwrap().next().unwrap().unwrap();
-    assert_eq!(first, mcap::records::Record::Header(header));
+    assert!(matches!(first, mcap::records::Record::Header(found) if found == header));
     let end = summary_start(&sidecar) - 13;
     assert_eq!(sidecar[end + 9..end + 13], crc32fast::hash(&sidecar[..end]).to_le_bytes());
 
