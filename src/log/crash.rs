@@ -156,7 +156,7 @@ fn an_appender_that_is_dropped_in_place_leaves_the_original() {
     let log = Log::open_in_place(&trial.path).unwrap();
     let channels = [NewChannel::json("/x", "trackfuse.Test", "{}")];
     let mut appender = Appender::begin(&log, &Destination::InPlace, &channels, Compression::None).unwrap();
-    appender.write(NewMessage { channel: 0, time_ns: 1, data: &[b' '; 100_000] }).unwrap();
+    appender.write(NewMessage { channel: 0, time_ns: 1, data: &vec![b' '; 100_000] }).unwrap();
     appender.write(NewMessage { channel: 0, time_ns: u64::MAX, data: b"1" }).unwrap();
     assert!(trial.now() != trial.original && trial.is_pending());
     drop(appender);

@@ -242,10 +242,11 @@ impl Log {
         Ok(record.metadata)
     }
 
-    /// Whether the data section ends as it should, and the file too.
+    /// Whether the data section ends as it should, and the file too, and is as long as it was.
     pub(super) fn ends_whole(&self) -> Result<bool, LogError> {
         let (end, len) = (self.index.data_end, self.index.file_len);
-        if self.file.len != len || len < end + DATA_END_LEN + MAGIC_LEN {
+        let len_now = self.file.file.metadata().map_or(0, |metadata| metadata.len());
+        if len_now != len || len < end + DATA_END_LEN + MAGIC_LEN {
             return Ok(false);
         }
         let head = self.file.bytes(end, HEAD_LEN, "the end of the data section")?;
