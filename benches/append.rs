@@ -9,7 +9,7 @@ use criterion::{Criterion, SamplingMode, Throughput, criterion_group, criterion_
 use mcap::records::MessageHeader;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use trackfuse::log::{Appender, Compression, Log, NewMessage};
+use trackfuse::log::{Appender, Compression, Destination, Log, NewMessage};
 use trackfuse::publish::{Context, Topic, track_messages};
 use trackfuse::sample::Source;
 use trackfuse::time::Time;
@@ -80,8 +80,9 @@ fn append(c: &mut Criterion) {
     group.bench_function("copy and add 70,000 points", |b| {
         b.iter(|| {
             let log = Log::open(&input).expect("a log");
+            let destination = Destination::New { out: output.clone(), force: true };
             let mut appender =
-                Appender::begin(&log, &output, true, &channels, Compression::Zstd).expect("an appender");
+                Appender::begin(&log, &destination, &channels, Compression::Zstd).expect("an appender");
             for message in track_messages(Topic::Track, &track, context) {
                 let (time_ns, data) = (message.time.to_log(), &message.data[..]);
                 appender.write(NewMessage { channel: message.topic as usize, time_ns, data }).expect("room");

@@ -22,9 +22,14 @@ pub struct Cli {
 pub enum Command {
     /// Fuse a log's sources into one track, extrapolate it, and write both beside the original channels
     ///
-    /// The original is never touched: the output is a new log whose data section begins with every byte of
-    /// the original's.
+    /// The original is not touched: the output is a new log whose data section begins with every byte of the
+    /// original's. `--in-place` appends to the log itself. `trackfuse restore` leads back from both.
     Fuse(Fuse),
+    /// Get the original log, bit for bit, out of a log that trackfuse added to
+    ///
+    /// Where a run with `--in-place` was cut off, this puts the original back. Else it takes off what runs that
+    /// ended have added: their outputs hold all that the original had.
+    Restore(Restore),
     /// Hold a track against a reference channel of the same log
     ///
     /// Errors phase by phase and at characteristic points (Zhang 2025, eq. 12 and 13), 3-D and by axis, and
@@ -58,6 +63,8 @@ pub struct Voice {
 #[command(after_help = "Examples:
   trackfuse fuse dive.mcap                       writes dive.fused.mcap
   trackfuse fuse dive.mcap --config dive.toml    names sources, heights, horizon, ...
+  trackfuse fuse dive.mcap --in-place            adds to dive.mcap: needs no second copy of a large log
+  trackfuse fuse dive.mcap --sidecar track.mcap  writes the new channels only, for viewers that merge logs
 
 Exit codes: 0 done; 1 failed, nothing written; 2 usage or config wrong, sources ambiguous, output
 exists; 3 done, with warnings that a person must read")]
@@ -70,12 +77,46 @@ pub struct Fuse {
     /// The log to write [default: LOG with .fused.mcap for .mcap]
     #[arg(long, short, value_name = "OUT")]
     pub output: Option<PathBuf>,
+    /// Append to LOG itself. Cut off at any moment, the next run or `trackfuse restore` puts LOG back
+    #[arg(long, conflicts_with_all = ["output", "sidecar"])]
+    pub in_place: bool,
+    /// Write the new channels only, as a log of their own
+    #[arg(long, value_name = "OUT", conflicts_with = "output")]
+    pub sidecar: Option<PathBuf>,
     /// Replace an existing output
     #[arg(long)]
     pub force: bool,
     /// Prefix of the new topics [default: the config's, else /fused]
     #[arg(long)]
     pub prefix: Option<String>,
+    /// How to talk.
+    #[command(flatten)]
+    pub voice: Voice,
+}
+
+/// Arguments of `restore`.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  trackfuse restore dive.fused.mcap              writes dive.fused.restored.mcap: dive.mcap as it was
+  trackfuse restore dive.mcap --in-place         takes off what `fuse --in-place` added to it
+  trackfuse restore dive.mcap                    after a run was cut off: puts dive.mcap back
+
+Exit codes: 0 done; 1 failed, nothing written; 2 output exists")]
+pub struct Restore {
+    /// The log that was added to
+    pub log: PathBuf,
+    /// The log to write [default: LOG with .restored.mcap for .mcap; LOG itself after a run was cut off]
+    #[arg(long, short, value_name = "OUT")]
+    pub output: Option<PathBuf>,
+    /// Make LOG itself the original again
+    #[arg(long, conflicts_with = "output")]
+    pub in_place: bool,
+    /// Take off only what was added last [default: everything]
+    #[arg(long)]
+    pub last: bool,
+    /// Replace an existing output
+    #[arg(long)]
+    pub force: bool,
     /// How to talk.
     #[command(flatten)]
     pub voice: Voice,

@@ -11,6 +11,7 @@ mod viewer_rules;
 mod cli {
     mod bad_input;
     mod compare;
+    mod crash;
     mod exit_code;
     mod export;
     mod init;
@@ -18,6 +19,7 @@ mod cli {
     mod output;
     mod readme;
     mod real_logs;
+    mod restore;
     mod sources;
     mod trial;
     mod trial_log;

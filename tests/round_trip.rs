@@ -13,7 +13,7 @@ use std::{
 };
 
 use trackfuse::log::{
-    Appender, Compression, Log, LogError, NewChannel, NewMessage, NewMetadata, Obstacle, Written,
+    Appender, Compression, Destination, Log, LogError, NewChannel, NewMessage, NewMetadata, Obstacle, Written,
 };
 
 const TOPIC: &str = "/fused/track";
@@ -112,7 +112,8 @@ fn new_channel(topic: &str) -> NewChannel {
 
 fn append(log: &Log, out: &Path, compression: Compression, force: bool) -> Result<Written, LogError> {
     let channels = [new_channel(TOPIC), new_channel("/fused/silent")];
-    let mut appender = Appender::begin(log, out, force, &channels, compression)?;
+    let mut appender =
+        Appender::begin(log, &Destination::New { out: out.to_owned(), force }, &channels, compression)?;
     for i in 0..3_u64 {
         let data = format!("{{\"i\":{i}}}");
         appender.write(NewMessage { channel: 0, time_ns: 1_000 + i, data: data.as_bytes() })?;

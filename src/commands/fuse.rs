@@ -1,14 +1,12 @@
 //! `trackfuse fuse`: log -> sources -> track -> log.
 
-use std::path::{Path, PathBuf};
-
 use sha2::{Digest, Sha256};
 
-use super::{CommandError, Outcome, say};
+use super::{CommandError, Outcome, beside, note, say};
 use crate::cli::Fuse;
 use crate::config::Config;
 use crate::fusion::{self, Fusion};
-use crate::log::{Appender, Log, NewMetadata};
+use crate::log::{Appender, Destination, Log, NewMetadata, put_back};
 use crate::publish::{Context, Topic, messages};
 use crate::report::{self, Report};
 use crate::resolve;
@@ -27,10 +25,14 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         config.output.prefix.clone_from(prefix);
         config.check()?;
     }
-    let log = Log::open(&args.log)?;
-    let output = args.output.clone().unwrap_or_else(|| beside(&args.log));
+    if put_back(&args.log)?.is_some() {
+        let log = args.log.display();
+        note(args.voice, &format!("a run that added to {log} was cut off: {log} is as it was before that"));
+    }
+    let log = if args.in_place { Log::open_in_place(&args.log)? } else { Log::open(&args.log)? };
+    let destination = destination(args);
     let channels = Topic::ALL.map(|topic| topic.channel(&config.output.prefix));
-    Appender::check(&log, &output, args.force, &channels)?;
+    Appender::check(&log, &destination, &channels)?;
 
     let named = !config.source.is_empty();
     let (unused, mut warnings) = choose_sources(&log, &mut config)?;
@@ -52,7 +54,8 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     let shift_s = resolve::log_time_shift_s(&loaded[datum]);
     warnings.extend(resolve::warnings_of(&loaded, shift_s));
     warnings.extend(fusion.warnings.iter().cloned());
-    let (input_name, output_name) = (args.log.display().to_string(), output.display().to_string());
+    let (input_name, output_name) =
+        (args.log.display().to_string(), destination.path(&log).display().to_string());
     let report = Report::new(&report::Parts {
         input: &input_name,
         output: &output_name,
@@ -74,7 +77,8 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         surface_at_zero: config.output.surface_at_zero == Some(true),
         log_start: resolve::log_start(&log, shift_s),
     };
-    let mut appender = Appender::begin(&log, &output, args.force, &channels, config.output.compression)?;
+    let metadata = metadata(&log, &config, &report)?;
+    let mut appender = Appender::begin(&log, &destination, &channels, config.output.compression)?;
     for message in messages(&fusion, context, &text, &warnings) {
         appender.write(crate::log::NewMessage {
             channel: message.topic as usize,
@@ -82,19 +86,27 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
             data: &message.data,
         })?;
     }
-    appender.write_metadata(&metadata(&log, &config, &report)?)?;
+    appender.write_metadata(&metadata)?;
     appender.finish()?;
-    let text = format!("{input_name} -> {output_name}\n\n{text}");
+    let files = if args.in_place {
+        format!("{input_name}, in place")
+    } else {
+        format!("{input_name} -> {output_name}")
+    };
+    let text = format!("{files}\n\n{text}");
     say(args.voice, &text, &report, &warnings);
     Ok(if warnings.is_empty() { Outcome::Done } else { Outcome::Warned })
 }
 
-/// `dive.mcap` -> `dive.fused.mcap`.
-fn beside(log: &Path) -> PathBuf {
-    let stem = log.file_stem().unwrap_or(log.as_os_str());
-    let mut name = stem.to_owned();
-    name.push(".fused.mcap");
-    log.with_file_name(name)
+/// Where the track goes.
+fn destination(args: &Fuse) -> Destination {
+    let force = args.force;
+    match (&args.sidecar, &args.output) {
+        _ if args.in_place => Destination::InPlace,
+        (Some(out), _) => Destination::Sidecar { out: out.clone(), force },
+        (None, Some(out)) => Destination::New { out: out.clone(), force },
+        (None, None) => Destination::New { out: beside(&args.log, "fused"), force },
+    }
 }
 
 /// Fills in the sources where the config names none, and returns the channels that were passed over, with

@@ -5,6 +5,7 @@ mod export;
 mod fuse;
 mod init;
 mod inspect;
+mod restore;
 mod simulate;
 
 pub use compare::compare;
@@ -12,9 +13,11 @@ pub use export::export;
 pub use fuse::fuse;
 pub use init::init;
 pub use inspect::inspect;
+pub use restore::restore;
 pub use simulate::simulate;
 
 use std::io::{self, IsTerminal, Write};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use crate::cli::Voice;
@@ -163,6 +166,20 @@ pub fn explain(error: &CommandError) {
     let _ = writeln!(stderr, "error: {}", lines.join("\n"));
     if let Some(hint) = error.hint() {
         let _ = writeln!(stderr, "hint: {hint}");
+    }
+}
+
+/// `dive.mcap` -> `dive.fused.mcap`.
+fn beside(log: &Path, what: &str) -> PathBuf {
+    let mut name = log.file_stem().unwrap_or(log.as_os_str()).to_owned();
+    name.push(format!(".{what}.mcap"));
+    log.with_file_name(name)
+}
+
+/// Prints what is worth knowing, and no reason to look into it.
+fn note(voice: Voice, text: &str) {
+    if !voice.quiet {
+        let _ = writeln!(io::stderr(), "note: {}", printable(text));
     }
 }
 

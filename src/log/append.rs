@@ -1,10 +1,6 @@
 //! A log's successor: its data section byte for byte, new chunks behind it, a summary of both.
 
-use std::{
-    collections::BTreeMap,
-    io,
-    path::{Path, PathBuf},
-};
+use std::{borrow::Cow, collections::BTreeMap, path::PathBuf};
 
 use mcap::records::{
     Channel, ChunkHeader, ChunkIndex, DataEnd, MessageHeader, MessageIndex, MessageIndexEntry, MetadataIndex,
@@ -14,15 +10,16 @@ use mcap::records::{
 use super::addition::{Compression, NewChannel, NewMessage, NewMetadata};
 use super::ids::{Ids, assign_ids};
 use super::index::SummaryRecord;
-use super::output::{Sink, check_output};
+use super::output::{Destination, Sink};
 use super::summary::{self, encode, encode_body, encode_bytes};
 use super::survey::count;
-use super::{Index, Log, LogError};
+use super::{Index, Log, LogError, old_tail};
 
 /// A viewer's seek then loads at most this much more than before.
 const CHUNK_BYTES: usize = 4_000_000;
 /// And at most this much log time.
 const CHUNK_NS: u64 = 30_000_000_000;
+const PIECE: u64 = 1 << 20;
 
 /// What was written.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -36,14 +33,14 @@ pub struct Written {
 }
 
 /// Writes a log's successor. Until [`Appender::finish`] nothing bears the output's name, and a
-/// dropped appender leaves nothing behind.
+/// dropped appender leaves nothing behind; in place, it leaves the log as it was.
 #[derive(Debug)]
 pub struct Appender<'a> {
-    log: &'a Log,
+    /// What was there before.
+    old: Cow<'a, Index>,
     out: PathBuf,
-    force: bool,
     compression: Compression,
-    sink: Sink,
+    sink: Sink<'a>,
     /// Id and next sequence number, by the new channel's place.
     channels: Vec<(u16, u32)>,
     chunk: Chunk,
@@ -53,34 +50,39 @@ pub struct Appender<'a> {
 }
 
 impl<'a> Appender<'a> {
-    /// Starts the successor of `log` that will be `out`, with all `channels`, and copies the data
-    /// section. All checks come before the copy.
+    /// Starts the successor of `log`, with all `channels`, and copies the data section of one that is a new
+    /// file. All checks come before the copy.
     ///
     /// # Errors
-    /// [`LogError::NotAppendable`]; [`LogError::OutputIsInput`]; [`LogError::OutputExists`] without
-    /// `force`; [`LogError::TopicTaken`] also for a topic given twice; [`LogError::IdsExhausted`];
-    /// [`LogError::Write`].
+    /// [`LogError::NotAppendable`]; [`LogError::OutputIsInput`]; [`LogError::OutputExists`] unless forced;
+    /// [`LogError::NotInPlace`]; [`LogError::InUse`] while another run writes the same;
+    /// [`LogError::TopicTaken`] also for a topic given twice; [`LogError::IdsExhausted`]; errors of
+    /// [`Appender::write`].
     pub fn begin(
         log: &'a Log,
-        out: impl AsRef<Path>,
-        force: bool,
+        destination: &Destination,
         channels: &[NewChannel],
         compression: Compression,
     ) -> Result<Self, LogError> {
-        let out = out.as_ref();
-        let ids = checked(log, out, force, channels)?;
+        let ids = checked(log, destination, channels)?;
+        let is_sidecar = matches!(destination, Destination::Sidecar { .. });
+        let old = if is_sidecar { Cow::Owned(Index::default()) } else { Cow::Borrowed(log.index()) };
         let mut appender = Self {
-            log,
-            out: out.to_owned(),
-            force,
+            out: destination.path(log).to_owned(),
             compression,
-            sink: Sink::copy(log, out)?,
+            sink: Sink::begin(log, destination)?,
             channels: Vec::new(),
             chunk: Chunk::default(),
             summary: Vec::new(),
-            statistics: statistics_of(log.index()),
+            statistics: statistics_of(&old),
             messages: 0,
+            old,
         };
+        if is_sidecar {
+            appender.put(&summary::start())?;
+        } else {
+            appender.keep_old_tail()?;
+        }
         // Before all chunks, so that each is readable on its own and a channel without messages is there.
         for (channel, ids) in channels.iter().zip(ids) {
             appender.define(channel, ids)?;
@@ -92,19 +94,15 @@ impl<'a> Appender<'a> {
     ///
     /// # Errors
     /// As [`Appender::begin`], but for [`LogError::Write`] of a full or read-only disk.
-    pub fn check(
-        log: &Log,
-        out: impl AsRef<Path>,
-        force: bool,
-        channels: &[NewChannel],
-    ) -> Result<(), LogError> {
-        checked(log, out.as_ref(), force, channels).map(|_| ())
+    pub fn check(log: &Log, destination: &Destination, channels: &[NewChannel]) -> Result<(), LogError> {
+        checked(log, destination, channels).map(|_| ())
     }
 
     /// Adds a message. Chunks are cut as messages come, so those near in time should come together.
     ///
     /// # Errors
-    /// [`LogError::Write`].
+    /// [`LogError::Write`] or [`LogError::Interrupted`], and then the output is taken back: a new file is gone,
+    /// in place the log is as it was. [`LogError::NotPutBack`] when it isn't yet.
     ///
     /// # Panics
     /// When `message.channel` is none of the channels given at the start.
@@ -130,7 +128,7 @@ impl<'a> Appender<'a> {
     /// Adds a metadata record.
     ///
     /// # Errors
-    /// [`LogError::Write`].
+    /// As [`Appender::write`].
     pub fn write_metadata(&mut self, metadata: &NewMetadata) -> Result<(), LogError> {
         let NewMetadata { name, entries } = metadata.clone();
         let record = encode(op::METADATA, &mcap::records::Metadata { name: name.clone(), metadata: entries });
@@ -144,20 +142,41 @@ impl<'a> Appender<'a> {
     /// Writes the rest, waits until all of it is on the disk, and gives the output its name.
     ///
     /// # Errors
-    /// [`LogError::Write`]; [`LogError::OutputExists`] when somebody else made `out` meanwhile.
+    /// As [`Appender::write`]; [`LogError::OutputExists`] when somebody else made the output meanwhile.
     pub fn finish(mut self) -> Result<Written, LogError> {
         self.end_chunk()?;
         let end = DataEnd { data_section_crc: self.sink.data_crc() };
         self.put(&encode(op::DATA_END, &end))?;
-        let tail = summary::tail(self.log.index(), &self.summary, &self.statistics, self.sink.position);
+        let tail = summary::tail(&self.old, &self.summary, &self.statistics, self.sink.position);
         self.put(&tail)?;
-        let Self { out, force, sink, messages, .. } = self;
+        let Self { out, sink, messages, .. } = self;
         let len = sink.position;
-        match sink.publish(&out, force) {
-            Ok(()) => Ok(Written { path: out, len, messages }),
-            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => Err(LogError::OutputExists { path: out }),
-            Err(source) => Err(LogError::Write { path: out, source }),
+        sink.finish()?;
+        Ok(Written { path: out, len, messages })
+    }
+
+    /// Attaches the old end, which the new one takes the place of.
+    fn keep_old_tail(&mut self) -> Result<(), LogError> {
+        let data_end = self.old.data_end;
+        let len = self.old.file_len.saturating_sub(data_end);
+        let head = old_tail::head(data_end, len);
+        let mut crc = crc32fast::Hasher::new();
+        crc.update(old_tail::summed(&head));
+        self.put(&head)?;
+        let mut piece = vec![0; len.min(PIECE) as usize];
+        let mut at = 0;
+        while at < len {
+            piece.truncate((len - at) as usize);
+            self.sink.read_old_tail(at, &mut piece)?;
+            crc.update(&piece);
+            self.put(&piece)?;
+            at += piece.len() as u64;
         }
+        self.put(&crc.finalize().to_le_bytes())?;
+        let entry = old_tail::index(data_end, len, &head);
+        self.summarize(op::ATTACHMENT_INDEX, encode(op::ATTACHMENT_INDEX, &entry));
+        self.statistics.attachment_count = self.statistics.attachment_count.saturating_add(1);
+        Ok(())
     }
 
     fn define(&mut self, channel: &NewChannel, ids: Ids) -> Result<(), LogError> {
@@ -195,7 +214,10 @@ impl<'a> Appender<'a> {
         if chunk.records.is_empty() {
             return Ok(());
         }
-        let compressed = self.compression.compress(&chunk.records).map_err(|e| self.cannot_write(e))?;
+        let compressed = self
+            .compression
+            .compress(&chunk.records)
+            .map_err(|source| LogError::Write { path: self.out.clone(), source })?;
         let header = ChunkHeader {
             message_start_time: chunk.start,
             message_end_time: chunk.end,
@@ -234,18 +256,18 @@ impl<'a> Appender<'a> {
     }
 
     fn put(&mut self, bytes: &[u8]) -> Result<(), LogError> {
-        self.sink.put(bytes).map_err(|e| self.cannot_write(e))
-    }
-
-    fn cannot_write(&self, source: io::Error) -> LogError {
-        LogError::Write { path: self.out.clone(), source }
+        self.sink.put(bytes)
     }
 }
 
-fn checked(log: &Log, out: &Path, force: bool, channels: &[NewChannel]) -> Result<Vec<Ids>, LogError> {
-    log.ensure_appendable()?;
-    check_output(log, out, force)?;
-    assign_ids(log, channels)
+fn checked(log: &Log, destination: &Destination, channels: &[NewChannel]) -> Result<Vec<Ids>, LogError> {
+    destination.check(log)?;
+    let ids = assign_ids(log.index(), log.path(), channels)?;
+    match destination {
+        // Viewers merge it with the log, so its topics must be new too; its ids are its own.
+        Destination::Sidecar { .. } => assign_ids(&Index::default(), log.path(), channels),
+        _ => Ok(ids),
+    }
 }
 
 /// The log's statistics, with counts that aren't below what is there: some writers count only what
@@ -288,7 +310,7 @@ impl Chunk {
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
+    use std::{fs, path::Path};
 
     use super::super::file::parse;
     use super::super::fixture::{PRIVATE, chunked, log, names_in, on_disk, records};
@@ -298,8 +320,12 @@ mod tests {
         NewChannel::json(topic, "trackfuse.Test", "{}")
     }
 
+    fn to(out: &Path, force: bool) -> Destination {
+        Destination::New { out: out.to_owned(), force }
+    }
+
     fn append(log: &Log, out: &Path, force: bool, compression: Compression) -> Result<Written, LogError> {
-        let mut appender = Appender::begin(log, out, force, &[channel("/fused/track")], compression)?;
+        let mut appender = Appender::begin(log, &to(out, force), &[channel("/fused/track")], compression)?;
         for i in 0..100_u64 {
             let data = i.to_string();
             appender.write(NewMessage { channel: 0, time_ns: i * 1_000_000_000, data: data.as_bytes() })?;
@@ -328,7 +354,8 @@ mod tests {
         let out = dir.path().join("out.mcap");
         fs::write(&out, "precious").unwrap();
         // At the start, not after an hour of copying.
-        let refused = Appender::begin(&log, &out, false, &[], Compression::Zstd).unwrap_err();
+        let refused =
+            Appender::begin(&log, &Destination::new_file(&out), &[], Compression::Zstd).unwrap_err();
         assert!(matches!(refused, LogError::OutputExists { .. }) && refused.hint().is_some(), "{refused}");
         assert_eq!(fs::read(&out).unwrap(), b"precious");
         assert_eq!(names_in(dir.path()), ["in.mcap", "out.mcap"]);
@@ -341,7 +368,7 @@ mod tests {
         let (dir, path) = on_disk(&log(chunked()));
         let log = Log::open(&path).unwrap();
         let out = dir.path().join("out.mcap");
-        let appender = Appender::begin(&log, &out, false, &[], Compression::Zstd).unwrap();
+        let appender = Appender::begin(&log, &Destination::new_file(&out), &[], Compression::Zstd).unwrap();
         fs::write(&out, "precious").unwrap();
         assert!(matches!(appender.finish(), Err(LogError::OutputExists { .. })));
         assert_eq!(fs::read(&out).unwrap(), b"precious");
@@ -369,7 +396,7 @@ mod tests {
         let log = Log::open(&path).unwrap();
         let out = dir.path().join("out.mcap");
         let begin = |out: &Path, channels: &[NewChannel]| {
-            Appender::begin(&log, out, false, channels, Compression::Zstd)
+            Appender::begin(&log, &Destination::new_file(out), channels, Compression::Zstd)
         };
         let mut given_up = begin(&out, &[channel("/x")]).unwrap();
         given_up.write(NewMessage { channel: 0, time_ns: 1, data: b"1" }).unwrap();
@@ -385,7 +412,8 @@ mod tests {
         let (dir, path) = on_disk(&log(chunked()));
         let log = Log::open(&path).unwrap();
         let out = dir.path().join("out.mcap");
-        let mut appender = Appender::begin(&log, &out, false, &[channel("/x")], Compression::Zstd).unwrap();
+        let mut appender =
+            Appender::begin(&log, &Destination::new_file(&out), &[channel("/x")], Compression::Zstd).unwrap();
         let large = vec![b' '; 1_500_000];
         for i in 0..100_u64 {
             let data: &[u8] = if i < 10 { &large } else { b"1" };
@@ -409,7 +437,8 @@ mod tests {
         let log = Log::open(&path).unwrap();
         let out = dir.path().join("out.mcap");
         let channels = [channel("/x"), channel("/y")];
-        let mut appender = Appender::begin(&log, &out, false, &channels, Compression::None).unwrap();
+        let mut appender =
+            Appender::begin(&log, &Destination::new_file(&out), &channels, Compression::None).unwrap();
         for i in 0..40 {
             // Not in the order of time, as messages of several channels may come.
             appender.write(NewMessage { channel: i % 2, time_ns: (i as u64 * 7) % 40, data: b"{}" }).unwrap();

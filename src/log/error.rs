@@ -2,6 +2,8 @@
 
 use std::{io, path::PathBuf};
 
+use crate::printable::shell_word;
+
 /// Why new channels can't be put into a log without making old messages hard to find.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Obstacle {
@@ -135,6 +137,56 @@ pub enum LogError {
         /// The output.
         path: PathBuf,
     },
+    /// Another run reads or writes the file.
+    #[error("{path:?} is in use by another run of trackfuse")]
+    InUse {
+        /// The log or the output.
+        path: PathBuf,
+    },
+    /// A log can't be changed in place; it was not touched.
+    #[error("cannot change {path:?} in place: {source}")]
+    NotInPlace {
+        /// The log.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// A run that changed the log in place was cut off.
+    #[error("{path:?} is not whole: a run that added to it was cut off")]
+    Pending {
+        /// The log.
+        path: PathBuf,
+    },
+    /// What a run that was cut off saved of a log can't be put back; nothing was touched.
+    #[error("the original can't be put back from {path:?}: {what}; nothing was touched")]
+    BadUndo {
+        /// What was saved.
+        path: PathBuf,
+        /// Why.
+        what: String,
+    },
+    /// A log could not be written, nor be made what it was; all that is needed for that lies beside it.
+    #[error("cannot write {path:?}, nor put the original back yet: {source}")]
+    NotPutBack {
+        /// The log.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// There is nothing to take off.
+    #[error("{path:?} holds nothing that trackfuse added{}", if *moved { " and left in its place" } else { "" })]
+    NothingAdded {
+        /// The log.
+        path: PathBuf,
+        /// Whether it holds an original's end that another program moved.
+        moved: bool,
+    },
+    /// Somebody wanted the program to end; what it was writing was taken back.
+    #[error("interrupted while writing {path:?}: it is as it was before")]
+    Interrupted {
+        /// The output.
+        path: PathBuf,
+    },
     /// The output could not be written; nothing of it remains.
     #[error("cannot write {path:?}: {source}")]
     Write {
@@ -159,10 +211,30 @@ impl LogError {
                  private records"
             }
             Self::TopicTaken { .. } => {
-                "choose another name with `--prefix`, or give the log that these channels were added to"
+                "choose another name with `--prefix`, or take off what was added with `trackfuse restore LOG`"
             }
             Self::OutputExists { .. } => "`--force` replaces it, `-o` names another",
-            Self::OutputIsInput { .. } => "`-o` names another output",
+            Self::OutputIsInput { .. } => {
+                "`-o` names another output; `--in-place` adds to the log itself, where a command has it"
+            }
+            Self::InUse { .. } => "wait until it has ended",
+            Self::NotInPlace { .. } => {
+                "`-o` writes a new log, `--sidecar` a log of the new channels only; neither touches this one"
+            }
+            Self::Pending { path } | Self::NotPutBack { path, .. } => {
+                let log = shell_word(&path.display().to_string());
+                return Some(format!(
+                    "`trackfuse restore {log}` puts the original back, bit for bit; keep the file \
+                     `.trackfuse-undo` beside it until then"
+                ));
+            }
+            Self::BadUndo { .. } => {
+                "if the log beside it is whole (another copy, say), remove the file; else keep both"
+            }
+            Self::NothingAdded { moved: true, .. } => {
+                "another program rewrote the log: only a log as trackfuse wrote it leads back to the original"
+            }
+            Self::NothingAdded { .. } => "give the log that `fuse` wrote; a sidecar holds no original",
             _ => return None,
         };
         Some(hint.to_owned())

@@ -1,14 +1,14 @@
 //! A log's bytes: read by offset, and never more of them than the file has.
 
 use std::{
-    fs::{self, File},
+    fs::{self, File, OpenOptions, TryLockError},
     io::{self, Cursor, Read},
     path::{Path, PathBuf},
 };
 
 use binrw::{BinRead, BinReaderExt};
 
-use super::LogError;
+use super::{LogError, undo};
 
 /// Opcode and length, before each record's body.
 pub(super) const HEAD_LEN: u64 = 9;
@@ -41,10 +41,50 @@ pub(super) struct LogFile {
     pub(super) path: PathBuf,
     pub(super) file: File,
     pub(super) len: u64,
+    /// Whether nobody else reads or writes it by this program meanwhile, and it can be changed.
+    pub(super) is_exclusive: bool,
 }
 
 impl LogFile {
+    /// Opens a log that no run was cut off in.
     pub(super) fn open(path: &Path) -> Result<Self, LogError> {
+        let file = Self::open_shared(path)?;
+        undo::refuse_pending(path)?;
+        Ok(file)
+    }
+
+    /// Opens a log for reading, which others may read too, but not change.
+    pub(super) fn open_shared(path: &Path) -> Result<Self, LogError> {
+        let log = Self::open_with(path, OpenOptions::new().read(true))?;
+        match log.file.try_lock_shared() {
+            Err(TryLockError::WouldBlock) => Err(LogError::InUse { path: path.to_owned() }),
+            // Where there are no locks nothing is changed in place either.
+            Err(TryLockError::Error(_)) | Ok(()) => Ok(log),
+        }
+    }
+
+    /// Opens a log to change it, for nobody else.
+    pub(super) fn open_exclusive(path: &Path) -> Result<Self, LogError> {
+        let refused = |source| LogError::NotInPlace { path: path.to_owned(), source };
+        let log = match Self::open_with(path, OpenOptions::new().read(true).write(true)) {
+            Err(LogError::Open { source, .. })
+                if matches!(
+                    source.kind(),
+                    io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem
+                ) =>
+            {
+                return Err(refused(source));
+            }
+            other => other?,
+        };
+        match log.file.try_lock() {
+            Ok(()) => Ok(Self { is_exclusive: true, ..log }),
+            Err(TryLockError::WouldBlock) => Err(LogError::InUse { path: path.to_owned() }),
+            Err(TryLockError::Error(e)) => Err(refused(io::Error::other(format!("it can't be locked: {e}")))),
+        }
+    }
+
+    fn open_with(path: &Path, options: &OpenOptions) -> Result<Self, LogError> {
         let cannot = |source| LogError::Open { path: path.to_owned(), source };
         // Asked before opening, which would wait on a named pipe.
         let kind = fs::metadata(path).map_err(cannot)?;
@@ -52,14 +92,14 @@ impl LogFile {
             let found = if kind.is_dir() { "it is a directory" } else { "it is no regular file" };
             return Err(cannot(io::Error::other(found)));
         }
-        let file = File::open(path).map_err(cannot)?;
+        let file = options.open(path).map_err(cannot)?;
         let len = file.metadata().map_err(cannot)?.len();
-        Ok(Self { path: path.to_owned(), file, len })
+        Ok(Self { path: path.to_owned(), file, len, is_exclusive: false })
     }
 
     /// The file's bytes from `offset` on. Readers don't disturb each other.
     pub(super) fn reader(&self, offset: u64) -> At<'_> {
-        At { file: &self.file, offset }
+        At::new(&self.file, offset)
     }
 
     /// Puts the bytes `[offset, offset + len)` into `buf`, in place of what it held.
@@ -147,7 +187,13 @@ where
 #[derive(Clone, Copy, Debug)]
 pub(super) struct At<'a> {
     file: &'a File,
-    offset: u64,
+    pub(super) offset: u64,
+}
+
+impl<'a> At<'a> {
+    pub(super) fn new(file: &'a File, offset: u64) -> Self {
+        Self { file, offset }
+    }
 }
 
 impl Read for At<'_> {

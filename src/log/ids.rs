@@ -1,8 +1,11 @@
 //! Ids for new schemas and channels.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+};
 
-use super::{Log, LogError, NewChannel};
+use super::{Index, LogError, NewChannel};
 
 /// The ids of a new channel.
 #[derive(Clone, Copy, Debug)]
@@ -12,10 +15,9 @@ pub(super) struct Ids {
     pub(super) channel: u16,
 }
 
-/// Ids that nothing in the log uses or refers to.
-pub(super) fn assign_ids(log: &Log, channels: &[NewChannel]) -> Result<Vec<Ids>, LogError> {
-    let index = log.index();
-    let exhausted = |kind| LogError::IdsExhausted { path: log.file.path.clone(), kind };
+/// Ids that nothing in the log at `path` uses or refers to.
+pub(super) fn assign_ids(index: &Index, path: &Path, channels: &[NewChannel]) -> Result<Vec<Ids>, LogError> {
+    let exhausted = |kind| LogError::IdsExhausted { path: path.to_owned(), kind };
     let mut topics: BTreeSet<&str> = index.channels.values().map(|channel| channel.topic.as_str()).collect();
     let schema_ids = index.channels.values().map(|channel| channel.schema_id);
     // 0 means "no schema" and is no schema's id; it is a channel's id like any other.
@@ -28,7 +30,7 @@ pub(super) fn assign_ids(log: &Log, channels: &[NewChannel]) -> Result<Vec<Ids>,
     let mut assigned = Vec::new();
     for channel in channels {
         if !topics.insert(&channel.topic) {
-            return Err(LogError::TopicTaken { path: log.file.path.clone(), topic: channel.topic.clone() });
+            return Err(LogError::TopicTaken { path: path.to_owned(), topic: channel.topic.clone() });
         }
         let key = (&channel.schema_name, &channel.schema_encoding, &channel.schema);
         let known = schemas.get(&key).copied();

@@ -7,8 +7,8 @@ use mcap::records::{
     op,
 };
 
-use super::file::{HEAD_LEN, Head, LogFile, parse};
-use super::{LogError, Obstacle, chunk, output, survey};
+use super::file::{HEAD_LEN, Head, LogFile, parse, split_head};
+use super::{LogError, Obstacle, chunk, output, survey, undo};
 
 const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 const MAGIC_LEN: u64 = MAGIC.len() as u64;
@@ -160,9 +160,24 @@ impl Log {
     ///
     /// # Errors
     /// [`LogError::Open`], [`LogError::NotMcap`], [`LogError::CutOff`] when the end is missing,
-    /// [`LogError::Damaged`] when the summary contradicts itself or the data section.
+    /// [`LogError::Damaged`] when the summary contradicts itself or the data section; [`LogError::Pending`] when
+    /// a run that added to it was cut off, [`LogError::InUse`] while one goes on.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, LogError> {
-        let file = LogFile::open(path.as_ref())?;
+        Self::of(LogFile::open(path.as_ref())?)
+    }
+
+    /// Opens a log to add to it in place: see [`super::Destination::InPlace`]. Until it is dropped nobody else
+    /// can open it by this library.
+    ///
+    /// # Errors
+    /// As [`Log::open`]; [`LogError::NotInPlace`] for a log that can't be written or locked.
+    pub fn open_in_place(path: impl AsRef<Path>) -> Result<Self, LogError> {
+        let file = LogFile::open_exclusive(path.as_ref())?;
+        undo::refuse_pending(path.as_ref())?;
+        Self::of(file)
+    }
+
+    fn of(file: LogFile) -> Result<Self, LogError> {
         let mut index = read_summary(&file)?;
         let obstacle = survey::complete(&file, &mut index)?;
         Ok(Self { file, index, obstacle })
@@ -217,9 +232,26 @@ impl Log {
     /// [`LogError::Read`]; [`LogError::Damaged`]; [`LogError::TooLarge`].
     pub fn metadata(&self, name: &str) -> Result<Option<BTreeMap<String, String>>, LogError> {
         let Some(entry) = self.index.metadata.iter().rfind(|m| m.name == name) else { return Ok(None) };
+        self.metadata_at(entry).map(Some)
+    }
+
+    /// The entries of a metadata record.
+    pub(super) fn metadata_at(&self, entry: &MetadataIndex) -> Result<BTreeMap<String, String>, LogError> {
         let head = self.file.head(entry.offset, self.index.data_end)?;
         let record: mcap::records::Metadata = read_record(&self.file, head, "metadata")?;
-        Ok(Some(record.metadata))
+        Ok(record.metadata)
+    }
+
+    /// Whether the data section ends as it should, and the file too, and is as long as it was.
+    pub(super) fn ends_whole(&self) -> Result<bool, LogError> {
+        let (end, len) = (self.index.data_end, self.index.file_len);
+        let len_now = self.file.file.metadata().map_or(0, |metadata| metadata.len());
+        if len_now != len || len < end + DATA_END_LEN + MAGIC_LEN {
+            return Ok(false);
+        }
+        let head = self.file.bytes(end, HEAD_LEN, "the end of the data section")?;
+        let magic = self.file.bytes(len - MAGIC_LEN, MAGIC_LEN, "the magic at the end")?;
+        Ok(split_head(&head) == Some((op::DATA_END, DATA_END_BODY_LEN)) && magic == MAGIC)
     }
 
     /// The parts of the log that hold messages, in file order.
@@ -345,7 +377,7 @@ mod tests {
     use std::{collections::BTreeSet, panic::catch_unwind};
 
     use super::super::fixture::{PRIVATE, chunked, log, on_disk, records, without_summary_crc};
-    use super::super::{Appender, Compression, WholePart};
+    use super::super::{Appender, Compression, Destination, WholePart};
     use super::*;
 
     fn open(bytes: &[u8]) -> Result<Log, LogError> {
@@ -365,7 +397,8 @@ mod tests {
             return Err(error);
         }
         log.for_each_message(&channels, |_| Ok::<_, LogError>(()))?;
-        Appender::begin(&log, dir.path().join("out.mcap"), false, &[], Compression::None)?.finish()?;
+        let out = Destination::new_file(dir.path().join("out.mcap"));
+        Appender::begin(&log, &out, &[], Compression::None)?.finish()?;
         Ok(())
     }
 

@@ -1,47 +1,120 @@
-//! The output on the disk: a nameless file beside it until all is written.
+//! Where new channels go: into a new file, into the log itself, or into a file of their own.
 
 use std::{
     fs::{self, File},
     io::{self, BufWriter, Read, Seek, Write},
-    path::Path,
+    path::{Path, PathBuf},
 };
 
 use tempfile::NamedTempFile;
 
+use super::disk;
+use super::file::{At, LogFile};
+use super::interrupt::{self, Writing};
+use super::new_file::{check_name, publish, readable_by_the_same, temporary_beside};
+use super::undo::Undo;
 use super::{Log, LogError};
 
-/// The output while it has no name, and what must be known about the bytes in it.
+/// So much is copied before somebody who wants it to end is heard. A multiple of any file system's block, so
+/// that blocks can be shared.
+const COPY_PIECE: u64 = 64 << 20;
+
+/// Where new channels go.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Destination {
+    /// A new file: the log's data section byte for byte, and the new channels behind it.
+    New {
+        /// Its name.
+        out: PathBuf,
+        /// Whether an existing file is replaced; a link is replaced by the file, what it leads to stays.
+        force: bool,
+    },
+    /// The log itself, opened with [`Log::open_in_place`]. Its data section stays as it is, the rest of the
+    /// log is read no more until it is opened anew.
+    InPlace,
+    /// A new file that holds the new channels only, a complete MCAP of its own.
+    Sidecar {
+        /// Its name.
+        out: PathBuf,
+        /// As of [`Destination::New`].
+        force: bool,
+    },
+}
+
+impl Destination {
+    /// A new file; an existing one is refused.
+    #[must_use]
+    pub fn new_file(out: impl Into<PathBuf>) -> Self {
+        Self::New { out: out.into(), force: false }
+    }
+
+    /// The file that is written.
+    #[must_use]
+    pub fn path<'a>(&'a self, log: &'a Log) -> &'a Path {
+        match self {
+            Self::New { out, .. } | Self::Sidecar { out, .. } => out,
+            Self::InPlace => log.path(),
+        }
+    }
+
+    /// Refuses a destination before any work is done for it.
+    pub(super) fn check(&self, log: &Log) -> Result<(), LogError> {
+        match self {
+            Self::New { out, force } => {
+                log.ensure_appendable()?;
+                check_output(log, out, *force)
+            }
+            Self::Sidecar { out, force } => check_output(log, out, *force),
+            Self::InPlace => {
+                log.ensure_appendable()?;
+                ensure_in_place(log)
+            }
+        }
+    }
+}
+
+/// The output while it is written, and what must be known about the bytes in it.
 #[derive(Debug)]
-pub(super) struct Sink {
-    file: BufWriter<NamedTempFile>,
+pub(super) struct Sink<'a> {
+    file: BufWriter<Target<'a>>,
+    path: PathBuf,
     pub(super) position: u64,
     /// `None` where the log has no data section CRC to continue.
     crc: Option<crc32fast::Hasher>,
+    _writing: Writing,
 }
 
-impl Sink {
-    /// The log's data section in a new file beside `out`.
-    pub(super) fn copy(log: &Log, out: &Path) -> Result<Self, LogError> {
-        let index = log.index();
-        let written = |source| LogError::Write { path: out.to_owned(), source };
-        let mut file = temporary_beside(out, readable_by_the_same(&log.file.file)).map_err(written)?;
-        let mut source = &log.file.file;
-        // Both are plain files, so that the kernel copies, and shares blocks where it can.
-        let copied = source
-            .rewind()
-            .and_then(|()| io::copy(&mut source.take(index.data_end), file.as_file_mut()))
-            .map_err(written)?;
-        if copied != index.data_end {
-            let what =
-                format!("only {copied} bytes of the data section are left, expected {}", index.data_end);
-            return Err(log.file.damaged(copied, what));
-        }
-        let crc = index.data_section_crc.map(crc32fast::Hasher::new_with_initial);
-        Ok(Self { file: BufWriter::new(file), position: copied, crc })
+impl<'a> Sink<'a> {
+    /// Begins an output. What comes next stands right behind the log's data section, in a sidecar at its start.
+    pub(super) fn begin(log: &'a Log, destination: &Destination) -> Result<Self, LogError> {
+        let writing = Writing::begin();
+        let (index, path) = (log.index(), destination.path(log));
+        let mut position = index.data_end;
+        let mut crc = index.data_section_crc.map(crc32fast::Hasher::new_with_initial);
+        let kind = match destination {
+            Destination::New { force, .. } => {
+                let mut file = temporary_beside(path, readable_by_the_same(&log.file.file))?;
+                copy_start(&log.file, position, file.as_file_mut(), path)?;
+                Kind::New { file: Some(file), force: *force, log: &log.file, data_end: position }
+            }
+            Destination::InPlace => {
+                let tail = log.file.reader(position);
+                let undo = Undo::create(&log.file, index.file_len, position, tail)?;
+                Kind::InPlace { log: &log.file, undo, is_original: false }
+            }
+            Destination::Sidecar { force, .. } => {
+                let file = temporary_beside(path, readable_by_the_same(&log.file.file))?;
+                (position, crc) = (0, Some(crc32fast::Hasher::new()));
+                Kind::New { file: Some(file), force: *force, log: &log.file, data_end: index.data_end }
+            }
+        };
+        let file = BufWriter::new(Target { kind, position });
+        Ok(Self { file, path: path.to_owned(), position, crc, _writing: writing })
     }
 
-    pub(super) fn put(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.file.write_all(bytes)?;
+    pub(super) fn put(&mut self, bytes: &[u8]) -> Result<(), LogError> {
+        interrupt::check(&self.path).map_err(|e| self.taken_back(e))?;
+        self.file.write_all(bytes).map_err(|e| self.failed(e))?;
         self.position += bytes.len() as u64;
         if let Some(crc) = &mut self.crc {
             crc.update(bytes);
@@ -49,86 +122,134 @@ impl Sink {
         Ok(())
     }
 
+    /// Reads the log's old end from `at` bytes behind its beginning on, also while it is being overwritten.
+    pub(super) fn read_old_tail(&mut self, at: u64, buf: &mut [u8]) -> Result<(), LogError> {
+        let mut from = match &self.file.get_ref().kind {
+            Kind::New { log, data_end, .. } => log.reader(*data_end),
+            Kind::InPlace { undo, .. } => undo.tail(),
+        };
+        from.offset += at;
+        from.read_exact(buf).map_err(|e| self.failed(e))
+    }
+
     /// CRC of all that was put so far, 0 for none.
     pub(super) fn data_crc(&self) -> u32 {
         self.crc.clone().map_or(0, crc32fast::Hasher::finalize)
     }
 
-    pub(super) fn publish(self, out: &Path, force: bool) -> io::Result<()> {
-        publish(self.file, out, force)
-    }
-}
-
-/// Writes a new file, of any content: nothing bears its name until all of it is on the disk. Returns its
-/// length in bytes.
-///
-/// # Errors
-/// [`LogError::OutputExists`] without `force`, before anything is written; [`LogError::Write`]; whatever
-/// `write` returns.
-pub fn write_new<E: From<LogError>>(
-    out: &Path,
-    force: bool,
-    write: impl FnOnce(&mut BufWriter<NamedTempFile>) -> Result<(), E>,
-) -> Result<u64, E> {
-    let written = |source| LogError::Write { path: out.to_owned(), source };
-    check_name(out, force)?;
-    let mut file = BufWriter::new(temporary_beside(out, None).map_err(written)?);
-    write(&mut file)?;
-    let len = file.stream_position().map_err(written)?;
-    match publish(file, out, force) {
-        Ok(()) => Ok(len),
-        Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {
-            Err(LogError::OutputExists { path: out.to_owned() }.into())
+    /// All is written: it is the output once it is on the disk.
+    pub(super) fn finish(mut self) -> Result<(), LogError> {
+        self.file.flush().map_err(|e| self.failed(e))?;
+        match &mut self.file.get_mut().kind {
+            Kind::New { file, force, .. } => match file.take() {
+                Some(file) => publish(file, &self.path, *force),
+                None => Ok(()),
+            },
+            Kind::InPlace { log, undo, is_original } => {
+                let done = disk::sync(&log.file).and_then(|()| undo.remove());
+                // then there is nothing left to put back
+                *is_original = done.is_ok();
+                done.map_err(|e| self.failed(e))
+            }
         }
-        Err(source) => Err(written(source).into()),
+    }
+
+    /// Takes the output back, and says why.
+    fn failed(&mut self, source: io::Error) -> LogError {
+        self.taken_back(LogError::Write { path: self.path.clone(), source })
+    }
+
+    fn taken_back(&mut self, error: LogError) -> LogError {
+        match self.file.get_mut().take_back() {
+            Ok(()) => error,
+            Err(source) => LogError::NotPutBack { path: self.path.clone(), source },
+        }
     }
 }
 
-/// Flushes, syncs and names a file, and syncs its directory.
-fn publish(file: BufWriter<NamedTempFile>, out: &Path, force: bool) -> io::Result<()> {
-    let file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
-    file.as_file().sync_all()?;
-    let named = if force { file.persist(out) } else { file.persist_noclobber(out) };
-    named.map_err(|e| e.error)?;
-    // the file is there and whole: that its name is on the disk too is wished for, and not always granted
-    #[cfg(unix)]
-    let _ = File::open(directory(out)).and_then(|folder| folder.sync_all());
+/// The bytes' place.
+#[derive(Debug)]
+struct Target<'a> {
+    kind: Kind<'a>,
+    position: u64,
+}
+
+#[derive(Debug)]
+enum Kind<'a> {
+    /// `file` has no name yet; without one it is finished or taken back.
+    New { file: Option<NamedTempFile>, force: bool, log: &'a LogFile, data_end: u64 },
+    /// While `is_original` isn't set, the log is being changed.
+    InPlace { log: &'a LogFile, undo: Undo, is_original: bool },
+}
+
+impl Target<'_> {
+    fn take_back(&mut self) -> io::Result<()> {
+        match &mut self.kind {
+            Kind::New { file, .. } => *file = None,
+            Kind::InPlace { is_original: true, .. } => {}
+            Kind::InPlace { log, undo, is_original } => {
+                // Whatever comes of it, nothing more is written.
+                *is_original = true;
+                undo.put_back(&log.file)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Write for Target<'_> {
+    fn write(&mut self, buf: &[u8]) -> io::Result<usize> {
+        let file = match &self.kind {
+            Kind::New { file: Some(file), .. } => file.as_file(),
+            Kind::InPlace { log, is_original: false, .. } => &log.file,
+            _ => return Err(io::Error::other("the output was given up")),
+        };
+        disk::write_at(file, buf, self.position)?;
+        self.position += buf.len() as u64;
+        Ok(buf.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Drop for Target<'_> {
+    fn drop(&mut self) {
+        // What can't be put back now can be later: see `undo`.
+        let _ = self.take_back();
+    }
+}
+
+/// The first `len` bytes of a log, at the start of `file`, which will be `out`. Both are plain files, so that
+/// the kernel copies, and shares blocks where it can.
+pub(super) fn copy_start(log: &LogFile, len: u64, file: &mut File, out: &Path) -> Result<(), LogError> {
+    let written = |source| LogError::Write { path: out.to_owned(), source };
+    let mut source = &log.file;
+    source.rewind().map_err(written)?;
+    let mut copied = 0;
+    while copied < len {
+        interrupt::check(out)?;
+        let piece = io::copy(&mut source.take(COPY_PIECE.min(len - copied)), file).map_err(written)?;
+        if piece == 0 {
+            let what = format!("only {copied} bytes of the data section are left, expected {len}");
+            return Err(log.damaged(copied, what));
+        }
+        copied += piece;
+    }
     Ok(())
 }
 
-fn directory(out: &Path) -> &Path {
-    out.parent().filter(|dir| !dir.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-/// The input's permissions, writable by its owner: a private recording's successor is private too.
-fn readable_by_the_same(input: &File) -> Option<fs::Permissions> {
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        let mode = input.metadata().ok()?.permissions().mode();
-        Some(fs::Permissions::from_mode(mode & 0o666 | 0o200))
-    }
-    #[cfg(not(unix))]
-    {
-        let _ = input;
-        None
-    }
-}
-
-fn temporary_beside(out: &Path, like: Option<fs::Permissions>) -> io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".trackfuse-").suffix(".part");
-    // As the file that it comes from, else as any new file, less the user's umask.
-    #[cfg(unix)]
-    builder.permissions(like.unwrap_or_else(|| std::os::unix::fs::PermissionsExt::from_mode(0o666)));
-    // Less the temporary's own name, which the user didn't choose.
-    builder.tempfile_in(directory(out)).map_err(|error| match error.kind() {
-        kind @ (io::ErrorKind::NotFound
-        | io::ErrorKind::PermissionDenied
-        | io::ErrorKind::ReadOnlyFilesystem
-        | io::ErrorKind::StorageFull) => kind.into(),
-        _ => error,
-    })
+/// Appends `len` bytes to `file`, which is `position` long and will be `out`.
+pub(super) fn copy_behind(
+    from: At<'_>,
+    len: u64,
+    file: &File,
+    position: u64,
+    out: &Path,
+) -> Result<(), LogError> {
+    super::undo::for_each_piece(from, len, |at, piece| disk::write_at(file, piece, position + at))
+        .map_err(|source| LogError::Write { path: out.to_owned(), source })
 }
 
 /// Refuses an output before any work is done for it.
@@ -137,19 +258,27 @@ pub(super) fn check_output(log: &Log, out: &Path, force: bool) -> Result<(), Log
     check_name(out, force)
 }
 
-fn check_name(out: &Path, force: bool) -> Result<(), LogError> {
-    let path = || out.to_owned();
-    let cannot = |why: String| Err(LogError::Write { path: path(), source: io::Error::other(why) });
-    if !directory(out).is_dir() {
-        return cannot(format!("there is no folder {}", directory(out).display()));
+/// Refuses to change a log whose original could not be put back for sure.
+pub(super) fn ensure_in_place(log: &Log) -> Result<(), LogError> {
+    let refuse = |why: &str| {
+        Err(LogError::NotInPlace { path: log.path().to_owned(), source: io::Error::other(why.to_owned()) })
+    };
+    if !log.file.is_exclusive {
+        return refuse("it was opened for reading only");
     }
-    match fs::symlink_metadata(out) {
-        Ok(found) if found.is_dir() => cannot("it is a directory".into()),
-        // A device or a pipe would be replaced, not written to.
-        Ok(found) if !found.is_file() && !found.is_symlink() => cannot("it is no regular file".into()),
-        Ok(_) if !force => Err(LogError::OutputExists { path: path() }),
-        _ => Ok(()),
+    if !log.ends_whole()? {
+        return refuse("its end is damaged");
     }
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        let names = log.file.file.metadata().map_or(1, |metadata| metadata.nlink());
+        // Under the other name nobody would find the old end after a crash; and it may be somebody's backup.
+        if names > 1 {
+            return refuse(&format!("the file has {names} names (hard links), and would change under all"));
+        }
+    }
+    Ok(())
 }
 
 /// Whether `out` leads to the open file `input`, by whatever link.

@@ -3,13 +3,20 @@
 use std::io::Cursor;
 
 use binrw::{BinWrite, BinWriterExt};
-use mcap::records::{Statistics, SummaryOffset, op};
+use mcap::records::{Header, Statistics, SummaryOffset, op};
 
 use super::Index;
 use super::file::HEAD_LEN;
 use super::index::SummaryRecord;
 
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
+
+/// What a log of nobody's profile begins with.
+pub(super) fn start() -> Vec<u8> {
+    let header =
+        Header { profile: String::new(), library: format!("trackfuse {}", env!("CARGO_PKG_VERSION")) };
+    [MAGIC, &encode(op::HEADER, &header)].concat()
+}
 
 /// A record of `body`.
 pub(super) fn encode_bytes(opcode: u8, body: &[&[u8]]) -> Vec<u8> {

@@ -8,6 +8,7 @@ mod export;
 pub mod inspection;
 mod proposal;
 mod registration;
+mod restore;
 mod text;
 
 pub use comparison::{
@@ -18,6 +19,7 @@ pub use export::ExportReport;
 pub use inspection::render_inspection;
 pub use proposal::InitReport;
 pub use registration::{NoiseReport, RegistrationReport, RejectedReport, UnknownReport};
+pub use restore::RestoreReport;
 pub use text::render;
 
 use schemars::JsonSchema;

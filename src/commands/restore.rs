@@ -1,0 +1,75 @@
+//! `trackfuse restore`: a log that was added to -> the original.
+
+use std::path::Path;
+
+use super::{CommandError, Outcome, beside, say};
+use crate::cli::Restore;
+use crate::log::{Log, put_back, restore_pending_to};
+use crate::printable::printable;
+use crate::report::RestoreReport;
+
+/// Takes off what was added to a log: what a run left half done, else what runs that ended added.
+///
+/// # Errors
+/// [`CommandError::Log`] for a log that nothing was added to, or that can't be the original's; then nothing is
+/// written.
+pub fn restore(args: &Restore) -> Result<Outcome, CommandError> {
+    let half_done = match &args.output {
+        Some(out) => restore_pending_to(&args.log, out, args.force)?,
+        None => put_back(&args.log)?,
+    };
+    let report = match half_done {
+        Some(len) => report(args, args.output.as_deref().unwrap_or(&args.log), len, true, [0, 0]),
+        None => take_off(args)?,
+    };
+    say(args.voice, &text(&report), &report, &[]);
+    Ok(Outcome::Done)
+}
+
+fn take_off(args: &Restore) -> Result<RestoreReport, CommandError> {
+    let log = if args.in_place { Log::open_in_place(&args.log)? } else { Log::open(&args.log)? };
+    let additions = log.additions()?;
+    let kept = if args.last { additions.len() - 1 } else { 0 };
+    let (addition, counts) = (&additions[kept], [additions.len() - kept, kept]);
+    let output = match &args.output {
+        _ if args.in_place => args.log.clone(),
+        Some(out) => out.clone(),
+        None => beside(&args.log, "restored"),
+    };
+    if args.in_place {
+        log.restore_in_place(addition)?;
+    } else {
+        log.restore_to(addition, &output, args.force)?;
+    }
+    Ok(report(args, &output, addition.original_len, false, counts))
+}
+
+fn report(
+    args: &Restore,
+    output: &Path,
+    len: u64,
+    half_done: bool,
+    [off, left]: [usize; 2],
+) -> RestoreReport {
+    RestoreReport {
+        version: env!("CARGO_PKG_VERSION").into(),
+        log: args.log.display().to_string(),
+        output: output.display().to_string(),
+        bytes: len.to_string(),
+        cut_off_run: half_done,
+        additions_taken_off: off,
+        additions_left: left,
+    }
+}
+
+fn text(report: &RestoreReport) -> String {
+    let what = match (report.cut_off_run, report.additions_taken_off, report.additions_left) {
+        (true, ..) => "as it was before a run that was cut off".to_owned(),
+        (_, 1, 0) => "the original, 1 addition taken off".to_owned(),
+        (_, off, 0) => format!("the original, {off} additions taken off"),
+        (_, off, left) => format!("{off} of {} additions taken off", off + left),
+    };
+    let RestoreReport { log, output, bytes, .. } = report;
+    let files = if log == output { format!("{log}, in place") } else { format!("{log} -> {output}") };
+    printable(&format!("{files}: {what}, {bytes} bytes")).into_owned() + "\n"
+}

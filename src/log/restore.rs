@@ -1,0 +1,162 @@
+//! The original of a log that was added to, bit for bit.
+
+use std::io::Read;
+use std::path::Path;
+
+use super::file::{At, LogFile};
+use super::interrupt::Writing;
+use super::new_file::{check_name, publish, readable_by_the_same, temporary_beside};
+use super::output::{check_output, copy_behind, copy_start, ensure_in_place, is_same_file};
+use super::undo::{self, Undo, for_each_piece};
+use super::{Log, LogError, old_tail};
+
+/// What the metadata record of an addition is called.
+const METADATA: &str = "trackfuse:";
+
+/// One addition of this program to a log, and the original before it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Addition {
+    /// Where it begins: the original's data section ends here.
+    pub offset: u64,
+    /// Length of the original in bytes.
+    pub original_len: u64,
+    /// Where the original's end stands in the log.
+    tail_at: u64,
+    /// Where the next addition begins.
+    end: u64,
+}
+
+impl Addition {
+    fn tail_len(&self) -> u64 {
+        self.original_len - self.offset
+    }
+}
+
+impl Log {
+    /// What this program added to the log, first to last.
+    ///
+    /// # Errors
+    /// [`LogError::NothingAdded`]; [`LogError::Read`]; [`LogError::Damaged`] where an addition is not as it was
+    /// written.
+    pub fn additions(&self) -> Result<Vec<Addition>, LogError> {
+        let index = self.index();
+        let mut additions: Vec<Addition> = Vec::new();
+        for found in index.attachments.iter().filter(|a| old_tail::is_one(a)) {
+            let tail_len = found.data_size;
+            let head = old_tail::head(found.offset, tail_len);
+            let stands = self.file.bytes(found.offset, head.len() as u64, "an attachment")?;
+            if stands != head {
+                return Err(self.file.damaged(found.offset, "the attachment with the original's end"));
+            }
+            if let Some(before) = additions.last_mut() {
+                before.end = found.offset;
+            }
+            additions.push(Addition {
+                offset: found.offset,
+                original_len: found.offset.saturating_add(tail_len),
+                tail_at: found.offset + head.len() as u64,
+                end: index.data_end,
+            });
+        }
+        if additions.is_empty() {
+            let moved = index.attachments.iter().any(old_tail::is_named_so);
+            return Err(LogError::NothingAdded { path: self.path().to_owned(), moved });
+        }
+        Ok(additions)
+    }
+
+    /// Holds the original's end against its checksum, and its length against what was noted of it.
+    fn verify(&self, addition: &Addition) -> Result<(), LogError> {
+        let Addition { offset, tail_at, .. } = *addition;
+        let tail_len = addition.tail_len();
+        let cannot = |source| LogError::Read { path: self.path().to_owned(), offset: tail_at, source };
+        let mut crc = crc32fast::Hasher::new();
+        crc.update(old_tail::summed(&old_tail::head(offset, tail_len)));
+        for_each_piece(self.file.reader(tail_at), tail_len, |_, piece| {
+            crc.update(piece);
+            Ok(())
+        })
+        .map_err(cannot)?;
+        let mut said = [0; 4];
+        self.file.reader(tail_at + tail_len).read_exact(&mut said).map_err(cannot)?;
+        let (found, said) = (crc.finalize(), u32::from_le_bytes(said));
+        if found != said {
+            let what =
+                format!("the CRC of the original's end is {found:08x}, the attachment says {said:08x}");
+            return Err(self.file.damaged(offset, what));
+        }
+        let of_this = |m: &&super::MetadataIndex| {
+            m.name.starts_with(METADATA) && (addition.offset..addition.end).contains(&m.offset)
+        };
+        for entry in self.index().metadata.iter().filter(of_this) {
+            let noted = self.metadata_at(entry)?.get("input_size").and_then(|size| size.parse::<u64>().ok());
+            if let Some(size) = noted.filter(|&size| size != addition.original_len) {
+                let what = format!(
+                    "the original would have {} bytes, {:?} says {size}",
+                    addition.original_len, entry.name
+                );
+                return Err(self.file.damaged(entry.offset, what));
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the original before an addition to a new file.
+    ///
+    /// # Errors
+    /// [`LogError::Damaged`] when it can't be the original; errors of [`super::write_new`].
+    pub fn restore_to(&self, addition: &Addition, out: &Path, force: bool) -> Result<(), LogError> {
+        check_output(self, out, force)?;
+        self.verify(addition)?;
+        let tail = self.file.reader(addition.tail_at);
+        write_original(&self.file, addition.offset, tail, addition.tail_len(), (out, force))
+    }
+
+    /// Makes the log, opened with [`Log::open_in_place`], the original before an addition.
+    ///
+    /// # Errors
+    /// [`LogError::Damaged`] when that can't be the original; [`LogError::NotInPlace`]; [`LogError::Write`], and
+    /// then the log is as it was; [`LogError::NotPutBack`].
+    pub fn restore_in_place(self, addition: &Addition) -> Result<(), LogError> {
+        ensure_in_place(&self)?;
+        self.verify(addition)?;
+        let _writing = Writing::begin();
+        // What was added goes by the same way as what a run that is cut off leaves behind.
+        let tail = self.file.reader(addition.tail_at);
+        let undo = Undo::create(&self.file, addition.original_len, addition.offset, tail)?;
+        undo.put_back(&self.file.file)
+            .map_err(|source| LogError::NotPutBack { path: self.path().to_owned(), source })
+    }
+}
+
+/// Writes the original of a log that a run was cut off in to a new file, and leaves all else as it is.
+/// The answer is its length, `None` where no run was cut off.
+///
+/// # Errors
+/// [`LogError::InUse`] while that run goes on; [`LogError::BadUndo`]; errors of [`super::write_new`].
+pub fn restore_pending_to(path: &Path, out: &Path, force: bool) -> Result<Option<u64>, LogError> {
+    let Some(pending) = undo::pending(path) else { return Ok(None) };
+    let log = LogFile::open_shared(path)?;
+    if is_same_file(&log.file, path, out) {
+        return Err(LogError::OutputIsInput { path: out.to_owned() });
+    }
+    check_name(out, force)?;
+    let undo = Undo::read(&pending, &log)?;
+    let (len, start) = (undo.original_len, undo.tail_start());
+    write_original(&log, start, undo.tail(), len - start, (out, force))?;
+    Ok(Some(len))
+}
+
+fn write_original(
+    log: &LogFile,
+    data_end: u64,
+    tail: At<'_>,
+    tail_len: u64,
+    (out, force): (&Path, bool),
+) -> Result<(), LogError> {
+    let _writing = Writing::begin();
+    let mut file = temporary_beside(out, readable_by_the_same(&log.file))?;
+    copy_start(log, data_end, file.as_file_mut(), out)?;
+    copy_behind(tail, tail_len, file.as_file(), data_end, out)?;
+    publish(file, out, force)
+}
