@@ -1,14 +1,15 @@
 //! `trackfuse fuse`: log -> sources -> track -> log.
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-use super::{CommandError, Outcome, say};
+use super::{CommandError, Outcome, open, say};
 use crate::cli::Fuse;
 use crate::config::Config;
 use crate::fusion::{self, Fusion};
-use crate::log::{Appender, Log, NewMetadata};
+use crate::log::{Appender, Log, LogError, NewMetadata};
 use crate::publish::{Context, Topic, messages};
 use crate::report::{self, Report};
 use crate::resolve;
@@ -27,13 +28,14 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         config.output.prefix.clone_from(prefix);
         config.check()?;
     }
-    let log = Log::open(&args.log)?;
+    let (log, mut warnings) = open(&args.log, args.strict)?;
     let output = args.output.clone().unwrap_or_else(|| beside(&args.log));
     let channels = Topic::ALL.map(|topic| topic.channel(&config.output.prefix));
     Appender::check(&log, &output, args.force, &channels)?;
 
     let named = !config.source.is_empty();
-    let (unused, mut warnings) = choose_sources(&log, &mut config)?;
+    let (unused, of_sources) = choose_sources(&log, &mut config)?;
+    warnings.extend(of_sources);
     let (loaded, origin, left_out) = source::load(&log, &config.source, named)?;
     warnings.extend(left_out);
     config.source = loaded.iter().map(|l| l.config.clone()).collect();
@@ -53,6 +55,7 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     warnings.extend(resolve::warnings_of(&loaded, shift_s));
     warnings.extend(fusion.warnings.iter().cloned());
     let (input_name, output_name) = (args.log.display().to_string(), output.display().to_string());
+    let notes: Vec<String> = log.visibility().note().into_iter().collect();
     let report = Report::new(&report::Parts {
         input: &input_name,
         output: &output_name,
@@ -62,6 +65,7 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         unused: &unused,
         plan: &plan,
         fusion: &fusion,
+        notes: &notes,
         warnings: &warnings,
     });
     let text = report::render(&report);
@@ -126,13 +130,29 @@ fn metadata(log: &Log, config: &Config, report: &Report) -> Result<NewMetadata, 
         ("config", toml::to_string(config).unwrap_or_default()),
         ("input_size", index.file_len.to_string()),
         ("input_data_section_crc", index.data_section_crc.map_or("none".into(), |c| format!("{c:08x}"))),
-        ("input_summary_sha256", Sha256::digest(log.tail()?).iter().map(|b| format!("{b:02x}")).collect()),
+        ("input_summary_sha256", sha256(log)?),
         ("report", without_file_names(report)),
     ];
     Ok(NewMetadata {
         name: format!("trackfuse:{}", config.output.prefix),
         entries: entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect(),
     })
+}
+
+/// The hash of what stands behind the log's data section.
+fn sha256(log: &Log) -> Result<String, LogError> {
+    let (mut tail, mut hash, mut buf) = (log.tail(), Sha256::new(), [0; 1 << 16]);
+    loop {
+        let read = tail.read(&mut buf).map_err(|source| LogError::Read {
+            path: log.path().to_owned(),
+            offset: log.index().data_end,
+            source,
+        })?;
+        if read == 0 {
+            return Ok(hash.finalize().iter().map(|b| format!("{b:02x}")).collect());
+        }
+        hash.update(buf.get(..read).unwrap_or_default());
+    }
 }
 
 /// The report as JSON, without the names of the files: those may change without the track changing.

@@ -1,7 +1,7 @@
 //! A log's successor: its data section byte for byte, new chunks behind it, a summary of both.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     io,
     path::{Path, PathBuf},
 };
@@ -12,12 +12,14 @@ use mcap::records::{
 };
 
 use super::addition::{Compression, NewChannel, NewMessage, NewMetadata};
+use super::contents::count;
+use super::file::parse;
 use super::ids::{Ids, assign_ids};
 use super::index::SummaryRecord;
 use super::output::{Sink, check_output};
+use super::rescue::{left_of_cut_chunk, lost_message_indexes};
 use super::summary::{self, encode, encode_body, encode_bytes};
-use super::survey::count;
-use super::{Index, Log, LogError};
+use super::{Index, Log, LogError, Visibility, chunk};
 
 /// A viewer's seek then loads at most this much more than before.
 const CHUNK_BYTES: usize = 4_000_000;
@@ -50,6 +52,8 @@ pub struct Appender<'a> {
     summary: Vec<SummaryRecord>,
     statistics: Statistics,
     messages: u64,
+    /// Chunks of the log that can't be decoded.
+    left_out: BTreeSet<u64>,
 }
 
 impl<'a> Appender<'a> {
@@ -57,7 +61,7 @@ impl<'a> Appender<'a> {
     /// section. All checks come before the copy.
     ///
     /// # Errors
-    /// [`LogError::NotAppendable`]; [`LogError::OutputIsInput`]; [`LogError::OutputExists`] without
+    /// [`LogError::OutputIsInput`]; [`LogError::OutputExists`] without
     /// `force`; [`LogError::TopicTaken`] also for a topic given twice; [`LogError::IdsExhausted`];
     /// [`LogError::Write`].
     pub fn begin(
@@ -80,7 +84,10 @@ impl<'a> Appender<'a> {
             summary: Vec::new(),
             statistics: statistics_of(log.index()),
             messages: 0,
+            left_out: BTreeSet::new(),
         };
+        appender.complete_torn_chunk()?;
+        appender.write_saved_messages()?;
         // Before all chunks, so that each is readable on its own and a channel without messages is there.
         for (channel, ids) in channels.iter().zip(ids) {
             appender.define(channel, ids)?;
@@ -127,6 +134,12 @@ impl<'a> Appender<'a> {
         Ok(())
     }
 
+    /// Leaves chunks of the log out of the chunk index, by their starts: those that were found to be undecodable
+    /// when they were read. Their bytes stay.
+    pub fn leave_out(&mut self, chunk_starts: impl IntoIterator<Item = u64>) {
+        self.left_out.extend(chunk_starts);
+    }
+
     /// Adds a metadata record.
     ///
     /// # Errors
@@ -149,7 +162,18 @@ impl<'a> Appender<'a> {
         self.end_chunk()?;
         let end = DataEnd { data_section_crc: self.sink.data_crc() };
         self.put(&encode(op::DATA_END, &end))?;
-        let tail = summary::tail(self.log.index(), &self.summary, &self.statistics, self.sink.position);
+        let old = self.log.index();
+        let start = self.sink.position;
+        let tail = match self.log.visibility() {
+            Visibility::Scanned { summary: false, .. } => summary::no_tail(),
+            Visibility::Scanned { .. } => {
+                summary::tail(old, &self.summary, &self.statistics, start, |_| false)
+            }
+            Visibility::Indexed | Visibility::Partly { .. } => {
+                let named = |chunk_start| !self.left_out.contains(&chunk_start);
+                summary::tail(old, &self.summary, &self.statistics, start, named)
+            }
+        };
         self.put(&tail)?;
         let Self { out, force, sink, messages, .. } = self;
         let len = sink.position;
@@ -188,6 +212,39 @@ impl<'a> Appender<'a> {
         self.statistics.channel_count = self.statistics.channel_count.saturating_add(1);
         self.channels.push((ids.channel, 0));
         Ok(())
+    }
+
+    /// Right behind the data section, where readers expect them: the message indexes that a cut took away.
+    fn complete_torn_chunk(&mut self) -> Result<(), LogError> {
+        let log = self.log;
+        let Some((mut chunk, lost)) = lost_message_indexes(&log.file, log.index())? else { return Ok(()) };
+        for index in lost {
+            let record = encode(op::MESSAGE_INDEX, &index);
+            chunk.message_index_offsets.insert(index.channel_id, self.sink.position);
+            chunk.message_index_length += record.len() as u64;
+            self.put(&record)?;
+        }
+        self.summarize(op::CHUNK_INDEX, encode(op::CHUNK_INDEX, &chunk));
+        Ok(())
+    }
+
+    /// What is left of the chunk at which the log is cut off, with the ids that it had.
+    fn write_saved_messages(&mut self) -> Result<(), LogError> {
+        let log = self.log;
+        let saved = left_of_cut_chunk(&log.file, log.index())?;
+        let saved = || chunk::records(&saved).map_while(Result::ok);
+        for record in saved().filter(|record| matches!(record.opcode, op::SCHEMA | op::CHANNEL)) {
+            self.put(record.whole)?;
+        }
+        for record in saved().filter(|record| record.opcode == op::MESSAGE) {
+            let header: MessageHeader =
+                parse(record.body).map_err(|problem| log.file.damaged(log.index().data_end, problem))?;
+            if !self.chunk.has_room(header.log_time, record.whole.len()) {
+                self.end_chunk()?;
+            }
+            self.chunk.push(&header, record.whole);
+        }
+        self.end_chunk()
     }
 
     fn end_chunk(&mut self) -> Result<(), LogError> {
@@ -243,7 +300,6 @@ impl<'a> Appender<'a> {
 }
 
 fn checked(log: &Log, out: &Path, force: bool, channels: &[NewChannel]) -> Result<Vec<Ids>, LogError> {
-    log.ensure_appendable()?;
     check_output(log, out, force)?;
     assign_ids(log, channels)
 }
@@ -256,7 +312,7 @@ fn statistics_of(index: &Index) -> Statistics {
     statistics.channel_count = statistics.channel_count.max(index.channels.len() as u32);
     statistics.attachment_count = index.attachments.len() as u32;
     statistics.metadata_count = index.metadata.len() as u32;
-    statistics.chunk_count = index.chunks.len() as u32;
+    statistics.chunk_count = (index.chunks.len() + index.undecodable) as u32;
     statistics
 }
 

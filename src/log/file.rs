@@ -13,7 +13,7 @@ use super::LogError;
 /// Opcode and length, before each record's body.
 pub(super) const HEAD_LEN: u64 = 9;
 
-/// What one record or one chunk may take in memory. Recorders write chunks of 1 to 8 MB; the
+/// What one record or one chunk may take in memory, bytes, unless the caller says else. Recorders write chunks of 1 to 8 MB; the
 /// largest single messages (point clouds, images) have some hundred MB.
 pub(super) const MEMORY_LIMIT: u64 = 1 << 30;
 
@@ -41,10 +41,12 @@ pub(super) struct LogFile {
     pub(super) path: PathBuf,
     pub(super) file: File,
     pub(super) len: u64,
+    /// What one record or one chunk may take in memory, bytes.
+    pub(super) memory_limit: u64,
 }
 
 impl LogFile {
-    pub(super) fn open(path: &Path) -> Result<Self, LogError> {
+    pub(super) fn open(path: &Path, memory_limit: u64) -> Result<Self, LogError> {
         let cannot = |source| LogError::Open { path: path.to_owned(), source };
         // Asked before opening, which would wait on a named pipe.
         let kind = fs::metadata(path).map_err(cannot)?;
@@ -54,7 +56,7 @@ impl LogFile {
         }
         let file = File::open(path).map_err(cannot)?;
         let len = file.metadata().map_err(cannot)?.len();
-        Ok(Self { path: path.to_owned(), file, len })
+        Ok(Self { path: path.to_owned(), file, len, memory_limit })
     }
 
     /// The file's bytes from `offset` on. Readers don't disturb each other.
@@ -74,7 +76,7 @@ impl LogFile {
             let what = format!("{what} claims {len} bytes, the file ends at {}", self.len);
             return Err(self.damaged(offset, what));
         }
-        if len > MEMORY_LIMIT {
+        if len > self.memory_limit {
             return Err(self.too_large(offset, what, len));
         }
         buf.clear();
@@ -122,7 +124,7 @@ impl LogFile {
     }
 
     pub(super) fn too_large(&self, offset: u64, what: &'static str, size: u64) -> LogError {
-        LogError::TooLarge { path: self.path.clone(), offset, what, size, limit: MEMORY_LIMIT }
+        LogError::TooLarge { path: self.path.clone(), offset, what, size, limit: self.memory_limit }
     }
 }
 

@@ -1,7 +1,17 @@
 //! MCAP at both ends, and nothing else knows MCAP.
 //!
 //! A recording is read through its summary: [`Log::open`] costs the same whatever the chunks hold.
-//! Where the summary leaves something out, [`Log::open`] finds it in the data section instead.
+//! Where the summary leaves something out or is damaged, [`Log::open`] finds it in the data section instead:
+//!
+//! | what | where |
+//! |---|---|
+//! | the end of the data section, the summary behind it | `ending` |
+//! | the summary's entries held against the records that they name | `extents` |
+//! | records that it doesn't name | `gaps` |
+//! | what chunks hold, where nothing else tells | `contents`, `survey` |
+//! | what is left of a log that is cut off | `rescue` |
+//! | how readers shall find old and new messages | [`Visibility`] |
+//!
 //! New channels are put behind the old ones with an [`Appender`]:
 //!
 //! ```text
@@ -11,33 +21,42 @@
 //! ```
 //!
 //! Nothing that a file claims is believed before it is checked: lengths against the file before
-//! memory is taken, checksums before content is handed on.
+//! memory is taken, checksums before content is handed on. What is wrong stands in [`Log::damage`].
 
 mod addition;
 mod append;
 mod chunk;
+mod contents;
+mod damage;
 pub mod decode;
+mod ending;
 mod error;
 mod excerpt;
+mod extents;
 mod file;
 #[cfg(test)]
 mod fixture;
+mod gaps;
 mod ids;
 mod index;
 mod messages;
+mod open;
 mod output;
+mod rescue;
 mod summary;
 mod survey;
 mod times;
-mod whole_part;
+mod visibility;
 
 pub use addition::{Compression, NewChannel, NewMessage, NewMetadata};
 pub use append::{Appender, Written};
-pub use error::{LogError, Obstacle};
+pub use damage::Damage;
+pub use error::LogError;
 pub use excerpt::Excerpt;
-pub use index::{Index, LeftOut, Log, Schema};
+pub use index::{Index, LeftOut, Schema};
 pub use mcap::records::{AttachmentIndex, Channel, ChunkIndex, MetadataIndex, Statistics};
 pub use messages::{Message, OwnedMessage};
+pub use open::Log;
 pub use output::write_new;
 pub use times::TimesRead;
-pub use whole_part::WholePart;
+pub use visibility::Visibility;
