@@ -31,7 +31,8 @@ pub(super) fn complete(
     let entries = index.chunks.len() + index.attachments.len() + index.metadata.len();
     let known = extents::check(file, index, damages)?;
     let contradicted = known.len() < entries;
-    let summarised_chunks = index.chunks.len();
+    // Viewers scan a log whose summary has no channels, whatever its chunk index.
+    let read_by_index = !index.chunks.is_empty() && !index.channels.is_empty();
 
     let data_end = index.data_end;
     let mut gaps =
@@ -61,7 +62,7 @@ pub(super) fn complete(
     } else if survey.hidden.is_none() {
         survey.find_hidden()?;
     }
-    let visibility = survey.visibility(summarised_chunks);
+    let visibility = survey.visibility(read_by_index);
     let found = counts(index);
     index.left_out = LeftOut {
         schemas: found.schemas.saturating_sub(summarised.schemas),
@@ -295,7 +296,7 @@ impl Survey<'_> {
     }
 
     /// What follows for a successor; its summary won't name what it must not.
-    fn visibility(&mut self, summarised_chunks: usize) -> Visibility {
+    fn visibility(&mut self, read_by_index: bool) -> Visibility {
         let Some(offset) = self.hidden else {
             // `@mcap/core` gives up at a chunk index with times and without message indexes.
             let empty = |chunk: &&ChunkIndex| {
@@ -308,7 +309,7 @@ impl Survey<'_> {
             self.drop_chunks(&empty);
             return Visibility::Indexed;
         };
-        if summarised_chunks > 0 {
+        if read_by_index {
             let unnamed = std::mem::take(&mut self.unnamed);
             self.drop_chunks(&unnamed);
             return Visibility::Partly { offset };

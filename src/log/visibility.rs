@@ -3,7 +3,7 @@
 //! Readers take one of two ways. With a chunk index they read the chunks that it names, and nothing else: messages
 //! outside chunks, and chunks that it leaves out, aren't there for them (PyPI `mcap`, `@mcap/core`, the mcap
 //! crate). `@mcap/core` reads through message indexes besides, and gives up at a chunk index without them.
-//! Without a chunk index PyPI `mcap` and viewers read the whole file. So a chunk index of the new chunks alone
+//! Without a chunk index PyPI `mcap` and viewers read the whole file; viewers also where the summary has no channels. So a chunk index of the new chunks alone
 //! would hide the old messages, and one of all chunks those that no index can name.
 
 /// How readers find the messages of a log's successor.
