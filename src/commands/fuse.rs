@@ -141,7 +141,7 @@ fn metadata(log: &Log, config: &Config, report: &Report) -> Result<NewMetadata, 
 
 /// The hash of what stands behind the log's data section.
 fn sha256(log: &Log) -> Result<String, LogError> {
-    let (mut tail, mut hash, mut buf) = (log.tail(), Sha256::new(), [0; 1 << 16]);
+    let (mut tail, mut hash, mut buf) = (log.tail(), Sha256::new(), vec![0; 1 << 16]);
     loop {
         let read = tail.read(&mut buf).map_err(|source| LogError::Read {
             path: log.path().to_owned(),

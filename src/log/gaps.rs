@@ -26,6 +26,8 @@ pub(super) struct Gaps<'a> {
     pub(super) definitions: Vec<(u8, Vec<u8>)>,
     /// The first message outside chunks.
     pub(super) loose: Option<u64>,
+    /// The first bytes that are no record.
+    pub(super) garbage: Option<u64>,
     /// Chunks that the summary doesn't name, by their starts.
     pub(super) chunks: BTreeSet<u64>,
 }
@@ -68,6 +70,7 @@ impl Gaps<'_> {
     fn garbage(&mut self, position: u64, end: u64, why: &str) {
         let what = format!("bytes that are no record stand in the data section, up to {end} ({why})");
         self.damages.push(position, what);
+        self.garbage.get_or_insert(position);
     }
 
     /// Takes one record in.

@@ -21,12 +21,12 @@ use super::visibility::Visibility;
 use super::{Index, LogError};
 
 /// Checks `index` against the file and adds what is missing. The answer is how readers of a successor will find
-/// the messages.
+/// the messages, and where the data section first holds bytes that are no record.
 pub(super) fn complete(
     file: &LogFile,
     index: &mut Index,
     damages: &mut Damages,
-) -> Result<Visibility, LogError> {
+) -> Result<(Visibility, Option<u64>), LogError> {
     let summarised = counts(index);
     let entries = index.chunks.len() + index.attachments.len() + index.metadata.len();
     let known = extents::check(file, index, damages)?;
@@ -35,15 +35,22 @@ pub(super) fn complete(
     let read_by_index = !index.chunks.is_empty() && !index.channels.is_empty();
 
     let data_end = index.data_end;
-    let mut gaps =
-        Gaps { file, index, damages, definitions: Vec::new(), loose: None, chunks: BTreeSet::new() };
+    let mut gaps = Gaps {
+        file,
+        index,
+        damages,
+        definitions: Vec::new(),
+        loose: None,
+        garbage: None,
+        chunks: BTreeSet::new(),
+    };
     let mut position = gaps.index.data_start;
     for extent in known {
         gaps.walk(position..extent.start)?;
         position = extent.end;
     }
     gaps.walk(position..data_end)?;
-    let Gaps { definitions, loose, chunks: unnamed, .. } = gaps;
+    let Gaps { definitions, loose, garbage, chunks: unnamed, .. } = gaps;
     for (opcode, bytes) in definitions {
         let adopted = adopt(index, opcode, &bytes);
         adopted.unwrap_or_else(|problem| damages.push(index.data_start, problem));
@@ -73,7 +80,7 @@ pub(super) fn complete(
         statistics: found.statistics && !summarised.statistics,
         scanned,
     };
-    Ok(visibility)
+    Ok((visibility, garbage))
 }
 
 /// How much the index holds.

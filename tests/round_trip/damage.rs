@@ -34,7 +34,7 @@ fn log_of(options: WriteOptions, messages: u64, bytes_each: usize, chunk_bytes: 
         .take(bytes_each)
         .collect();
         let time = 1_000 + i * 1_000_000;
-        let channel_id = ids[(i % 3 == 1) as usize];
+        let channel_id = ids[usize::from(i % 3 == 1)];
         let header = MessageHeader { channel_id, sequence: i as u32, log_time: time, publish_time: time };
         writer.write_to_known_channel(&header, &data).unwrap();
     }
