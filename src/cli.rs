@@ -86,6 +86,9 @@ pub struct Fuse {
     /// Replace an existing output
     #[arg(long)]
     pub force: bool,
+    /// Refuse a log that is damaged, instead of using what can be trusted
+    #[arg(long)]
+    pub strict: bool,
     /// Prefix of the new topics [default: the config's, else /fused]
     #[arg(long)]
     pub prefix: Option<String>,
@@ -162,6 +165,9 @@ pub struct Compare {
     /// A further height to compare at, such as exit=-2, in metres, Z up [default: those on the events topic]
     #[arg(long, value_name = "NAME=Z", value_parser = height, allow_hyphen_values = true)]
     pub height: Vec<Height>,
+    /// Refuse a log that is damaged, instead of using what can be trusted
+    #[arg(long)]
+    pub strict: bool,
     /// How to talk.
     #[command(flatten)]
     pub voice: Voice,
@@ -197,6 +203,9 @@ pub struct Export {
     /// Replace an existing output
     #[arg(long)]
     pub force: bool,
+    /// Refuse a log that is damaged, instead of using what can be trusted
+    #[arg(long)]
+    pub strict: bool,
     /// How to talk.
     #[command(flatten)]
     pub voice: Voice,

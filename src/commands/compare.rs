@@ -1,6 +1,6 @@
 //! `trackfuse compare`: a track of a log against a reference channel of it.
 
-use super::{CommandError, Outcome, show};
+use super::{CommandError, Outcome, open, show};
 use crate::cli::Compare;
 use crate::estimate::characteristic_point::Height;
 use crate::log::Log;
@@ -17,8 +17,9 @@ use crate::time::Time;
 /// [`CommandError`] for a log that can't be read, a channel that doesn't fit, and two that have no instant in
 /// common.
 pub fn compare(args: &Compare) -> Result<Outcome, CommandError> {
-    let log = Log::open(&args.log)?;
-    let estimate = source::recorded(&log, &args.estimate)?;
+    let (log, damage) = open(&args.log, args.strict)?;
+    let mut estimate = source::recorded(&log, &args.estimate)?;
+    estimate.warnings.splice(..0, damage);
     let (mut reference, reference_origin) = source::reference(&log, &args.reference, args.reference_time)?;
     let t0 = estimate.origin();
     let shift_s = reference_origin.seconds_since(t0);

@@ -2,9 +2,9 @@
 
 use std::io::{self, BufWriter, Write};
 
-use super::{CommandError, Outcome, say, show};
+use super::{CommandError, Outcome, open, say, show};
 use crate::cli::{Export, Format};
-use crate::log::{Log, LogError, write_new};
+use crate::log::{LogError, write_new};
 use crate::printable::printable;
 use crate::report::{ExportReport, csv};
 use crate::source;
@@ -16,11 +16,12 @@ use crate::source;
 /// written.
 pub fn export(args: &Export) -> Result<Outcome, CommandError> {
     let Format::Csv = args.format;
-    let log = Log::open(&args.log)?;
+    let (log, damage) = open(&args.log, args.strict)?;
     if let Some(out) = &args.output {
         log.ensure_other(out)?;
     }
-    let recorded = source::recorded(&log, &args.topic)?;
+    let mut recorded = source::recorded(&log, &args.topic)?;
+    recorded.warnings.splice(..0, damage);
     let t0 = recorded.origin();
     let warnings = &recorded.warnings;
     let mut report = ExportReport::new(args.log.display().to_string(), &args.topic, &recorded);

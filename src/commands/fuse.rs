@@ -1,12 +1,14 @@
 //! `trackfuse fuse`: log -> sources -> track -> log.
 
+use std::io::Read;
+
 use sha2::{Digest, Sha256};
 
-use super::{CommandError, Outcome, beside, note, say};
+use super::{CommandError, Outcome, beside, damage_of, note, say};
 use crate::cli::Fuse;
 use crate::config::Config;
 use crate::fusion::{self, Fusion};
-use crate::log::{Appender, Destination, Log, NewMetadata, put_back};
+use crate::log::{Appender, Destination, Log, LogError, NewMetadata, put_back};
 use crate::publish::{Context, Topic, messages};
 use crate::report::{self, Report};
 use crate::resolve;
@@ -30,12 +32,14 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         note(args.voice, &format!("a run that added to {log} was cut off: {log} is as it was before that"));
     }
     let log = if args.in_place { Log::open_in_place(&args.log)? } else { Log::open(&args.log)? };
+    let mut warnings = damage_of(&log, args.strict)?;
     let destination = destination(args);
     let channels = Topic::ALL.map(|topic| topic.channel(&config.output.prefix));
     Appender::check(&log, &destination, &channels)?;
 
     let named = !config.source.is_empty();
-    let (unused, mut warnings) = choose_sources(&log, &mut config)?;
+    let (unused, of_sources) = choose_sources(&log, &mut config)?;
+    warnings.extend(of_sources);
     let (loaded, origin, left_out) = source::load(&log, &config.source, named)?;
     warnings.extend(left_out);
     config.source = loaded.iter().map(|l| l.config.clone()).collect();
@@ -56,6 +60,7 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     warnings.extend(fusion.warnings.iter().cloned());
     let (input_name, output_name) =
         (args.log.display().to_string(), destination.path(&log).display().to_string());
+    let notes: Vec<String> = log.visibility().note().into_iter().collect();
     let report = Report::new(&report::Parts {
         input: &input_name,
         output: &output_name,
@@ -65,6 +70,7 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         unused: &unused,
         plan: &plan,
         fusion: &fusion,
+        notes: &notes,
         warnings: &warnings,
     });
     let text = report::render(&report);
@@ -138,13 +144,29 @@ fn metadata(log: &Log, config: &Config, report: &Report) -> Result<NewMetadata, 
         ("config", toml::to_string(config).unwrap_or_default()),
         ("input_size", index.file_len.to_string()),
         ("input_data_section_crc", index.data_section_crc.map_or("none".into(), |c| format!("{c:08x}"))),
-        ("input_summary_sha256", Sha256::digest(log.tail()?).iter().map(|b| format!("{b:02x}")).collect()),
+        ("input_summary_sha256", sha256(log)?),
         ("report", without_file_names(report)),
     ];
     Ok(NewMetadata {
         name: format!("trackfuse:{}", config.output.prefix),
         entries: entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect(),
     })
+}
+
+/// The hash of what stands behind the log's data section.
+fn sha256(log: &Log) -> Result<String, LogError> {
+    let (mut tail, mut hash, mut buf) = (log.tail(), Sha256::new(), vec![0; 1 << 16]);
+    loop {
+        let read = tail.read(&mut buf).map_err(|source| LogError::Read {
+            path: log.path().to_owned(),
+            offset: log.index().data_end,
+            source,
+        })?;
+        if read == 0 {
+            return Ok(hash.finalize().iter().map(|b| format!("{b:02x}")).collect());
+        }
+        hash.update(buf.get(..read).unwrap_or_default());
+    }
 }
 
 /// The report as JSON, without the names of the files: those may change without the track changing.

@@ -23,7 +23,7 @@ use std::process::ExitCode;
 use crate::cli::Voice;
 use crate::config::ConfigError;
 use crate::estimate::EstimateError;
-use crate::log::{LogError, WholePart};
+use crate::log::{Log, LogError};
 use crate::printable::printable;
 use crate::resolve::ResolveError;
 use crate::simulate::SimulateError;
@@ -48,14 +48,6 @@ pub enum CommandError {
     /// The log.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// A log that can't be opened, and what is left of it.
-    #[error("{error}\n{whole}")]
-    Broken {
-        /// What is wrong with it.
-        error: LogError,
-        /// What is not.
-        whole: Box<WholePart>,
-    },
     /// The sources.
     #[error(transparent)]
     Source(#[from] SourceError),
@@ -109,7 +101,7 @@ impl CommandError {
     pub fn hint(&self) -> Option<String> {
         match self {
             Self::Config(error) => error.hint(),
-            Self::Log(error) | Self::Broken { error, .. } => error.hint(),
+            Self::Log(error) => error.hint(),
             Self::Source(error) => error.hint(),
             Self::Resolve(error) => Some(error.hint()),
             Self::NothingInCommon { .. } => {
@@ -128,11 +120,9 @@ impl CommandError {
             Self::Source(error) => error.is_usage(),
             Self::Simulate(error) => is_of_scenario(error),
             Self::Scenario { error, .. } => is_of_scenario(error),
-            Self::Broken { .. }
-            | Self::Print(_)
-            | Self::Estimate(_)
-            | Self::NotFinite { .. }
-            | Self::NothingInCommon { .. } => false,
+            Self::Print(_) | Self::Estimate(_) | Self::NotFinite { .. } | Self::NothingInCommon { .. } => {
+                false
+            }
         };
         if usage { 2 } else { 1 }
     }
@@ -156,6 +146,21 @@ impl From<Outcome> for ExitCode {
             Outcome::Warned => Self::from(3),
         }
     }
+}
+
+/// Opens a log, and says what is wrong with it; refuses it then where only a whole one will do.
+fn open(path: &Path, strict: bool) -> Result<(Log, Vec<String>), LogError> {
+    let log = Log::open(path)?;
+    let warnings = damage_of(&log, strict)?;
+    Ok((log, warnings))
+}
+
+/// What is wrong with a log; refuses it where only a whole one will do.
+fn damage_of(log: &Log, strict: bool) -> Result<Vec<String>, LogError> {
+    if strict {
+        log.ensure_whole()?;
+    }
+    Ok(log.damage_warnings())
 }
 
 /// Prints why a command wrote nothing, and what to do about it, on stderr.

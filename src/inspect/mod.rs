@@ -14,7 +14,7 @@ mod rhythm;
 use std::collections::BTreeMap;
 
 use crate::config::SourceConfig;
-use crate::log::{Excerpt, Index, Log, LogError, TimesRead};
+use crate::log::{Excerpt, Index, Log, TimesRead};
 use crate::publish::Topic;
 use crate::report::inspection::{
     ChecksumReport, ClocksRead, CompressionReport, FileReport, FuseReport, IndexReport, Inspection,
@@ -55,8 +55,10 @@ pub fn inspect(log: &Log, prefix: &str) -> Inspection {
         warnings: Vec::new(),
     };
     let damaged = [&times.damaged, &judgement.damaged, &excerpt.damaged].into_iter().flatten();
+    let damaged = log.damage_warnings().into_iter().chain(damaged.map(ToString::to_string));
     noticed::warn(&mut inspection, index, recognised.as_ref().ok(), &glimpses, damaged);
     inspection.notes = noticed::notes(&inspection);
+    inspection.notes.extend(log.visibility().note());
     inspection
 }
 
@@ -141,7 +143,12 @@ fn checksums(index: &Index, times: &TimesRead, excerpt: &Excerpt) -> ChecksumRep
     let with = index.chunks.len().saturating_sub(times.chunks_without_crc);
     let read = if index.left_out.scanned { with } else { excerpt.chunks_read };
     ChecksumReport {
-        summary: if index.summary_crc.is_some() { "right" } else { "none" }.into(),
+        summary: match (index.summary_distrusted, index.summary_crc) {
+            (true, _) => "not used",
+            (false, Some(_)) => "right",
+            (false, None) => "none",
+        }
+        .into(),
         data_section: if index.data_section_crc.is_some() { "not checked" } else { "none" }.into(),
         chunks_without: times.chunks_without_crc,
         // those without one are not told apart among those that were read
@@ -175,19 +182,10 @@ fn fuse(log: &Log, recognised: Result<&Recognised, &SourceError>, prefix: &str) 
     let new = Topic::ALL.map(|topic| topic.channel(prefix).topic);
     let taken_topic = new.iter().find(|topic| log.index().channels_of(topic).next().is_some());
     let taken_topic = taken_topic.map(|t| format!("{t} is in the log already: `--prefix` names others"));
-    let refused = log.ensure_appendable().err();
-    let obstacle = refused.as_ref().map(|error| match error {
-        LogError::NotAppendable { obstacle, .. } => format!("channels can't be added safely: {obstacle}"),
-        other => other.to_string(),
-    });
     let choosing = unclear.as_ref().is_some_and(|(_, candidates)| *candidates > 0);
     FuseReport {
-        can_append: refused.is_none(),
-        hint: match &refused {
-            Some(error) => error.hint(),
-            None => choosing.then(|| format!("`{}` writes a config to choose in", init_line(log.path()))),
-        },
-        refusals: [obstacle, taken_topic, unclear.map(|u| u.0)].into_iter().flatten().collect(),
+        hint: choosing.then(|| format!("`{}` writes a config to choose in", init_line(log.path()))),
+        refusals: [taken_topic, unclear.map(|u| u.0)].into_iter().flatten().collect(),
         sources: recognised.map_or(Vec::new(), |r| r.sources.iter().map(taken).collect()),
     }
 }

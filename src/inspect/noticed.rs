@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::log::{Index, LogError};
+use crate::log::Index;
 use crate::printable::printable;
 use crate::report::inspection::{ChannelReport, ClockReport, Inspection, Role, TimesReport};
 use crate::resolve;
@@ -13,19 +13,16 @@ use crate::time::Time;
 const NAMED: usize = 5;
 
 /// What is wrong with the log, and what `fuse` would warn of or refuse.
-pub(super) fn warn<'a>(
+pub(super) fn warn(
     inspection: &mut Inspection,
     index: &Index,
     recognised: Option<&Recognised>,
     glimpses: &BTreeMap<String, Glimpse>,
-    damaged: impl Iterator<Item = &'a LogError>,
+    damaged: impl Iterator<Item = String>,
 ) {
     // One damaged chunk is met on several ways.
-    let damaged: BTreeSet<String> = damaged.map(LogError::to_string).collect();
-    let mut warnings: Vec<String> = damaged.into_iter().collect();
-    if !inspection.fuse.can_append {
-        warnings.extend(inspection.fuse.refusals.first().cloned());
-    }
+    let mut seen = BTreeSet::new();
+    let mut warnings: Vec<String> = damaged.filter(|what| seen.insert(what.clone())).collect();
     warnings.extend(miscounted(inspection, index));
     warnings.extend(undated(inspection));
     warnings.extend(recognised.map_or(&[][..], |r| r.warnings.as_slice()).iter().cloned());

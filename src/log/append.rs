@@ -1,6 +1,10 @@
 //! A log's successor: its data section byte for byte, new chunks behind it, a summary of both.
 
-use std::{borrow::Cow, collections::BTreeMap, path::PathBuf};
+use std::{
+    borrow::Cow,
+    collections::{BTreeMap, BTreeSet},
+    path::PathBuf,
+};
 
 use mcap::records::{
     Channel, ChunkHeader, ChunkIndex, DataEnd, MessageHeader, MessageIndex, MessageIndexEntry, MetadataIndex,
@@ -8,12 +12,14 @@ use mcap::records::{
 };
 
 use super::addition::{Compression, NewChannel, NewMessage, NewMetadata};
+use super::contents::count;
+use super::file::parse;
 use super::ids::{Ids, assign_ids};
 use super::index::SummaryRecord;
 use super::output::{Destination, Sink};
+use super::rescue::{left_of_cut_chunk, lost_message_indexes};
 use super::summary::{self, encode, encode_body, encode_bytes};
-use super::survey::count;
-use super::{Index, Log, LogError, old_tail};
+use super::{Index, Log, LogError, Visibility, chunk, old_tail};
 
 /// A viewer's seek then loads at most this much more than before.
 const CHUNK_BYTES: usize = 4_000_000;
@@ -47,6 +53,10 @@ pub struct Appender<'a> {
     summary: Vec<SummaryRecord>,
     statistics: Statistics,
     messages: u64,
+    /// How readers will find it all.
+    visibility: Visibility,
+    /// Chunks of the log that can't be decoded.
+    left_out: BTreeSet<u64>,
 }
 
 impl<'a> Appender<'a> {
@@ -54,10 +64,9 @@ impl<'a> Appender<'a> {
     /// file. All checks come before the copy.
     ///
     /// # Errors
-    /// [`LogError::NotAppendable`]; [`LogError::OutputIsInput`]; [`LogError::OutputExists`] unless forced;
-    /// [`LogError::NotInPlace`]; [`LogError::InUse`] while another run writes the same;
-    /// [`LogError::TopicTaken`] also for a topic given twice; [`LogError::IdsExhausted`]; errors of
-    /// [`Appender::write`].
+    /// [`LogError::OutputIsInput`]; [`LogError::OutputExists`] unless forced; [`LogError::NotInPlace`];
+    /// [`LogError::InUse`] while another run writes the same; [`LogError::TopicTaken`] also for a topic given
+    /// twice; [`LogError::IdsExhausted`]; errors of [`Appender::write`].
     pub fn begin(
         log: &'a Log,
         destination: &Destination,
@@ -77,11 +86,15 @@ impl<'a> Appender<'a> {
             statistics: statistics_of(&old),
             messages: 0,
             old,
+            visibility: if is_sidecar { Visibility::Indexed } else { log.visibility() },
+            left_out: BTreeSet::new(),
         };
         if is_sidecar {
             appender.put(&summary::start())?;
         } else {
+            appender.complete_torn_chunk(log)?;
             appender.keep_old_tail()?;
+            appender.write_saved_messages(log)?;
         }
         // Before all chunks, so that each is readable on its own and a channel without messages is there.
         for (channel, ids) in channels.iter().zip(ids) {
@@ -125,6 +138,12 @@ impl<'a> Appender<'a> {
         Ok(())
     }
 
+    /// Leaves chunks of the log out of the chunk index, by their starts: those that were found to be undecodable
+    /// when they were read. Their bytes stay.
+    pub fn leave_out(&mut self, chunk_starts: impl IntoIterator<Item = u64>) {
+        self.left_out.extend(chunk_starts);
+    }
+
     /// Adds a metadata record.
     ///
     /// # Errors
@@ -147,7 +166,17 @@ impl<'a> Appender<'a> {
         self.end_chunk()?;
         let end = DataEnd { data_section_crc: self.sink.data_crc() };
         self.put(&encode(op::DATA_END, &end))?;
-        let tail = summary::tail(&self.old, &self.summary, &self.statistics, self.sink.position);
+        let start = self.sink.position;
+        let tail = match self.visibility {
+            Visibility::Scanned { summary: false, .. } => summary::no_tail(),
+            Visibility::Scanned { .. } => {
+                summary::tail(&self.old, &self.summary, &self.statistics, start, |_| false)
+            }
+            Visibility::Indexed | Visibility::Partly { .. } => {
+                let named = |chunk_start| !self.left_out.contains(&chunk_start);
+                summary::tail(&self.old, &self.summary, &self.statistics, start, named)
+            }
+        };
         self.put(&tail)?;
         let Self { out, sink, messages, .. } = self;
         let len = sink.position;
@@ -160,6 +189,7 @@ impl<'a> Appender<'a> {
         let data_end = self.old.data_end;
         let len = self.old.file_len.saturating_sub(data_end);
         let head = old_tail::head(data_end, len);
+        let offset = self.sink.position;
         let mut crc = crc32fast::Hasher::new();
         crc.update(old_tail::summed(&head));
         self.put(&head)?;
@@ -173,7 +203,7 @@ impl<'a> Appender<'a> {
             at += piece.len() as u64;
         }
         self.put(&crc.finalize().to_le_bytes())?;
-        let entry = old_tail::index(data_end, len, &head);
+        let entry = old_tail::index(offset, data_end, len, &head);
         self.summarize(op::ATTACHMENT_INDEX, encode(op::ATTACHMENT_INDEX, &entry));
         self.statistics.attachment_count = self.statistics.attachment_count.saturating_add(1);
         Ok(())
@@ -207,6 +237,37 @@ impl<'a> Appender<'a> {
         self.statistics.channel_count = self.statistics.channel_count.saturating_add(1);
         self.channels.push((ids.channel, 0));
         Ok(())
+    }
+
+    /// Right behind the data section, where readers expect them: the message indexes that a cut took away.
+    fn complete_torn_chunk(&mut self, log: &Log) -> Result<(), LogError> {
+        let Some((mut chunk, lost)) = lost_message_indexes(&log.file, log.index())? else { return Ok(()) };
+        for index in lost {
+            let record = encode(op::MESSAGE_INDEX, &index);
+            chunk.message_index_offsets.insert(index.channel_id, self.sink.position);
+            chunk.message_index_length += record.len() as u64;
+            self.put(&record)?;
+        }
+        self.summarize(op::CHUNK_INDEX, encode(op::CHUNK_INDEX, &chunk));
+        Ok(())
+    }
+
+    /// What is left of the chunk at which the log is cut off, with the ids that it had.
+    fn write_saved_messages(&mut self, log: &Log) -> Result<(), LogError> {
+        let saved = left_of_cut_chunk(&log.file, log.index())?;
+        let saved = || chunk::records(&saved).map_while(Result::ok);
+        for record in saved().filter(|record| matches!(record.opcode, op::SCHEMA | op::CHANNEL)) {
+            self.put(record.whole)?;
+        }
+        for record in saved().filter(|record| record.opcode == op::MESSAGE) {
+            let header: MessageHeader =
+                parse(record.body).map_err(|problem| log.file.damaged(log.index().data_end, problem))?;
+            if !self.chunk.has_room(header.log_time, record.whole.len()) {
+                self.end_chunk()?;
+            }
+            self.chunk.push(&header, record.whole);
+        }
+        self.end_chunk()
     }
 
     fn end_chunk(&mut self) -> Result<(), LogError> {
@@ -278,7 +339,7 @@ fn statistics_of(index: &Index) -> Statistics {
     statistics.channel_count = statistics.channel_count.max(index.channels.len() as u32);
     statistics.attachment_count = index.attachments.len() as u32;
     statistics.metadata_count = index.metadata.len() as u32;
-    statistics.chunk_count = index.chunks.len() as u32;
+    statistics.chunk_count = (index.chunks.len() + index.undecodable) as u32;
     statistics
 }
 

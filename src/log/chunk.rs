@@ -1,11 +1,11 @@
 //! The records of a chunk, decompressed and checked.
 
-use std::io::{BufReader, Read};
+use std::io::{self, BufReader, Read};
 use std::ops::Range;
 
 use mcap::records::{ChunkHeader, ChunkIndex, op};
 
-use super::file::{HEAD_LEN, LogFile, MEMORY_LIMIT, split_head};
+use super::file::{HEAD_LEN, LogFile, parse, split_head};
 use super::{Index, LogError};
 
 /// Start, end, size, CRC, the name's length and the compressed size: a chunk's header without the name.
@@ -19,6 +19,19 @@ pub(super) enum Block<'a> {
     Chunk(&'a ChunkIndex),
     /// Schemas, channels and messages outside chunks, some MB of them.
     Loose(Range<u64>),
+    /// What is left of the chunk at which the log is cut off.
+    Cut(&'a CutChunk),
+}
+
+/// The beginning of a chunk, where the log is cut off.
+#[derive(Clone, Debug)]
+pub(super) struct CutChunk {
+    pub(super) offset: u64,
+    pub(super) header: ChunkHeader,
+    /// What is left of its compressed bytes.
+    pub(super) data: Range<u64>,
+    /// How many bytes of whole records that gives.
+    pub(super) saved_bytes: u64,
 }
 
 impl Block<'_> {
@@ -26,6 +39,7 @@ impl Block<'_> {
         match self {
             Self::Chunk(chunk) => chunk.chunk_start_offset,
             Self::Loose(range) => range.start,
+            Self::Cut(cut) => cut.offset,
         }
     }
 
@@ -34,6 +48,7 @@ impl Block<'_> {
         match self {
             Self::Chunk(chunk) => chunk.uncompressed_size,
             Self::Loose(range) => range.end - range.start,
+            Self::Cut(cut) => cut.saved_bytes,
         }
     }
 
@@ -43,7 +58,7 @@ impl Block<'_> {
             Self::Chunk(chunk) => {
                 chunk.message_index_offsets.is_empty() || chunk.message_index_offsets.contains_key(&channel)
             }
-            Self::Loose(_) => true,
+            Self::Loose(_) | Self::Cut(_) => true,
         }
     }
 }
@@ -53,6 +68,7 @@ pub(super) fn blocks(index: &Index) -> Vec<Block<'_>> {
     let chunks = index.chunks.iter().map(Block::Chunk);
     let mut blocks: Vec<_> = chunks.chain(index.loose.iter().cloned().map(Block::Loose)).collect();
     blocks.sort_by_key(Block::offset);
+    blocks.extend(index.cut_chunk.as_ref().map(Block::Cut));
     blocks
 }
 
@@ -83,40 +99,86 @@ pub(super) fn read_header(
     }
 }
 
-/// Puts the records of `block` into `buf`. A chunk's size and checksum are checked.
+/// The chunk that begins at `offset` and is cut off, `None` where none does.
+pub(super) fn look_at_cut(file: &LogFile, offset: u64) -> Result<Option<CutChunk>, LogError> {
+    let left = file.len.saturating_sub(offset);
+    let bytes = file.bytes(offset, left.min(HEAD_LEN + LONGEST_HEADER), "a chunk's header")?;
+    if bytes.first() != Some(&op::CHUNK) {
+        return Ok(None);
+    }
+    let Ok(header) = parse::<ChunkHeader>(bytes.get(HEAD_LEN as usize..).unwrap_or_default()) else {
+        return Ok(None);
+    };
+    let start = offset + HEAD_LEN + FIXED_HEADER_LEN + header.compression.len() as u64;
+    let end = start.saturating_add(header.compressed_size).min(file.len);
+    Ok((start <= end).then_some(CutChunk { offset, header, data: start..end, saved_bytes: 0 }))
+}
+
+/// Puts the records of `block` into `buf`. A chunk's size and checksum are checked; of one that is cut off the
+/// whole records are taken, which nothing checks.
 pub(super) fn read_block(file: &LogFile, block: &Block<'_>, buf: &mut Vec<u8>) -> Result<(), LogError> {
     let chunk = match block {
         Block::Loose(range) => {
             return file.read_into(range.start, range.end - range.start, "a run of records", buf);
         }
+        Block::Cut(cut) => return read_cut(file, cut, buf),
         Block::Chunk(chunk) => chunk,
     };
     let offset = chunk.chunk_start_offset;
     let (header, data) = read_header(file, offset, offset.saturating_add(chunk.chunk_length).min(file.len))?;
     let size = header.uncompressed_size;
-    if size > MEMORY_LIMIT {
+    if size > file.memory_limit {
         return Err(file.too_large(offset, "the chunk", size));
     }
-    let compressed = file.reader(data.start).take(data.end - data.start);
-    buf.clear();
     // One byte more than claimed tells a chunk that holds more from one that is right.
-    let read = match header.compression.as_str() {
-        "" => compressed.take(size + 1).read_to_end(buf),
-        "zstd" => zstd::Decoder::with_buffer(BufReader::with_capacity(1 << 17, compressed))
-            .and_then(|decoder| decoder.take(size + 1).read_to_end(buf)),
-        "lz4" => lz4::Decoder::new(BufReader::with_capacity(1 << 17, compressed))
-            .and_then(|decoder| decoder.take(size + 1).read_to_end(buf)),
-        name => {
-            let (path, name) = (file.path.clone(), name.to_owned());
-            return Err(LogError::UnknownCompression { path, offset, name });
-        }
-    };
-    read.map_err(|e| file.damaged(offset, format!("the chunk can't be decompressed: {e}")))?;
+    decompress(file, offset, &header, data, size + 1, buf)?
+        .map_err(|e| file.damaged(offset, format!("the chunk can't be decompressed: {e}")))?;
     if buf.len() as u64 != size {
         let relation = if buf.len() as u64 > size { "more than" } else { "less than" };
         return Err(file.damaged(offset, format!("the chunk holds {relation} the {size} bytes it claims")));
     }
-    let found = crc32fast::hash(buf);
+    check_crc(file, offset, &header, buf)
+}
+
+/// What can be decompressed of a chunk that is cut off, up to its last whole record.
+fn read_cut(file: &LogFile, cut: &CutChunk, buf: &mut Vec<u8>) -> Result<(), LogError> {
+    let size = cut.header.uncompressed_size;
+    // That it ends too early is no news.
+    let _ = decompress(file, cut.offset, &cut.header, cut.data.clone(), size.min(file.memory_limit), buf)?;
+    if buf.len() as u64 == size {
+        check_crc(file, cut.offset, &cut.header, buf)?;
+    }
+    let whole = records(buf).map_while(Result::ok).map(|record| record.whole.len()).sum();
+    buf.truncate(whole);
+    Ok(())
+}
+
+/// Puts at most `most` decompressed bytes into `buf`: all that there are before the error, if there is one.
+fn decompress(
+    file: &LogFile,
+    offset: u64,
+    header: &ChunkHeader,
+    data: Range<u64>,
+    most: u64,
+    buf: &mut Vec<u8>,
+) -> Result<io::Result<usize>, LogError> {
+    let compressed = file.reader(data.start).take(data.end - data.start);
+    buf.clear();
+    Ok(match header.compression.as_str() {
+        "" => compressed.take(most).read_to_end(buf),
+        "zstd" => zstd::Decoder::with_buffer(BufReader::with_capacity(1 << 17, compressed))
+            .and_then(|decoder| decoder.take(most).read_to_end(buf)),
+        "lz4" => lz4::Decoder::new(BufReader::with_capacity(1 << 17, compressed))
+            .and_then(|decoder| decoder.take(most).read_to_end(buf)),
+        name => {
+            let (path, name) = (file.path.clone(), name.to_owned());
+            return Err(LogError::UnknownCompression { path, offset, name });
+        }
+    })
+}
+
+fn check_crc(file: &LogFile, offset: u64, header: &ChunkHeader, content: &[u8]) -> Result<(), LogError> {
+    let found = crc32fast::hash(content);
     if header.uncompressed_crc != 0 && header.uncompressed_crc != found {
         let what = format!("the chunk's CRC is {found:08x}, its header says {:08x}", header.uncompressed_crc);
         return Err(file.damaged(offset, what));

@@ -2,30 +2,8 @@
 
 use std::{io, path::PathBuf};
 
+use super::Damage;
 use crate::printable::shell_word;
-
-/// Why new channels can't be put into a log without making old messages hard to find.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Obstacle {
-    /// Messages stand in the data section itself, where an indexed reader doesn't look.
-    #[error("messages stand outside chunks, the first near offset {offset}")]
-    LooseMessages {
-        /// Where the first of them, or the schemas and channels before it, begins.
-        offset: u64,
-    },
-    /// A chunk holds messages, but no index tells which.
-    #[error("the chunk at offset {offset} has no message index")]
-    NoMessageIndex {
-        /// Where the chunk begins.
-        offset: u64,
-    },
-    /// Bytes between the indexed parts of the data section aren't records.
-    #[error("bytes that are no record stand at offset {offset} of the data section")]
-    Garbage {
-        /// Where they begin.
-        offset: u64,
-    },
-}
 
 /// Why a log could not be read, or its successor not written.
 #[derive(Debug, thiserror::Error)]
@@ -101,13 +79,15 @@ pub enum LogError {
         /// The compression's name.
         name: String,
     },
-    /// New channels would hide old messages from indexed readers.
-    #[error("cannot safely add channels to {path:?}: {obstacle}")]
-    NotAppendable {
+    /// The log is damaged, and only a whole one was asked for.
+    #[error("{path:?} is {first}{}", more_damage(*.more))]
+    NotWhole {
         /// The log.
         path: PathBuf,
-        /// Why.
-        obstacle: Obstacle,
+        /// What is wrong with it first.
+        first: Damage,
+        /// How much more is.
+        more: usize,
     },
     /// The log already has a channel of this name.
     #[error("{path:?} already has the topic {topic:?}")]
@@ -206,10 +186,7 @@ impl LogError {
             Self::CutOff { .. } | Self::Damaged { .. } => {
                 "`mcap recover IN -o OUT` saves what is readable (it drops private records and bad chunks)"
             }
-            Self::NotAppendable { .. } => {
-                "keep the original and add to an indexed copy: `mcap recover LOG -o COPY` makes one, but drops \
-                 private records"
-            }
+            Self::NotWhole { .. } => "without `--strict`, what can be trusted is used, and the rest is named",
             Self::TopicTaken { .. } => {
                 "choose another name with `--prefix`, or take off what was added with `trackfuse restore LOG`"
             }
@@ -239,4 +216,8 @@ impl LogError {
         };
         Some(hint.to_owned())
     }
+}
+
+fn more_damage(more: usize) -> String {
+    if more == 0 { String::new() } else { format!(" (and {more} more)") }
 }

@@ -13,7 +13,7 @@ use super::{LogError, undo};
 /// Opcode and length, before each record's body.
 pub(super) const HEAD_LEN: u64 = 9;
 
-/// What one record or one chunk may take in memory. Recorders write chunks of 1 to 8 MB; the
+/// What one record or one chunk may take in memory, bytes, unless the caller says else. Recorders write chunks of 1 to 8 MB; the
 /// largest single messages (point clouds, images) have some hundred MB.
 pub(super) const MEMORY_LIMIT: u64 = 1 << 30;
 
@@ -41,21 +41,23 @@ pub(super) struct LogFile {
     pub(super) path: PathBuf,
     pub(super) file: File,
     pub(super) len: u64,
+    /// What one record or one chunk may take in memory, bytes.
+    pub(super) memory_limit: u64,
     /// Whether nobody else reads or writes it by this program meanwhile, and it can be changed.
     pub(super) is_exclusive: bool,
 }
 
 impl LogFile {
     /// Opens a log that no run was cut off in.
-    pub(super) fn open(path: &Path) -> Result<Self, LogError> {
-        let file = Self::open_shared(path)?;
+    pub(super) fn open(path: &Path, memory_limit: u64) -> Result<Self, LogError> {
+        let file = Self::open_shared(path, memory_limit)?;
         undo::refuse_pending(path)?;
         Ok(file)
     }
 
     /// Opens a log for reading, which others may read too, but not change.
-    pub(super) fn open_shared(path: &Path) -> Result<Self, LogError> {
-        let log = Self::open_with(path, OpenOptions::new().read(true))?;
+    pub(super) fn open_shared(path: &Path, memory_limit: u64) -> Result<Self, LogError> {
+        let log = Self::open_with(path, OpenOptions::new().read(true), memory_limit)?;
         match log.file.try_lock_shared() {
             Err(TryLockError::WouldBlock) => Err(LogError::InUse { path: path.to_owned() }),
             // Where there are no locks nothing is changed in place either.
@@ -64,9 +66,9 @@ impl LogFile {
     }
 
     /// Opens a log to change it, for nobody else.
-    pub(super) fn open_exclusive(path: &Path) -> Result<Self, LogError> {
+    pub(super) fn open_exclusive(path: &Path, memory_limit: u64) -> Result<Self, LogError> {
         let refused = |source| LogError::NotInPlace { path: path.to_owned(), source };
-        let log = match Self::open_with(path, OpenOptions::new().read(true).write(true)) {
+        let log = match Self::open_with(path, OpenOptions::new().read(true).write(true), memory_limit) {
             Err(LogError::Open { source, .. })
                 if matches!(
                     source.kind(),
@@ -84,7 +86,7 @@ impl LogFile {
         }
     }
 
-    fn open_with(path: &Path, options: &OpenOptions) -> Result<Self, LogError> {
+    fn open_with(path: &Path, options: &OpenOptions, memory_limit: u64) -> Result<Self, LogError> {
         let cannot = |source| LogError::Open { path: path.to_owned(), source };
         // Asked before opening, which would wait on a named pipe.
         let kind = fs::metadata(path).map_err(cannot)?;
@@ -94,7 +96,7 @@ impl LogFile {
         }
         let file = options.open(path).map_err(cannot)?;
         let len = file.metadata().map_err(cannot)?.len();
-        Ok(Self { path: path.to_owned(), file, len, is_exclusive: false })
+        Ok(Self { path: path.to_owned(), file, len, memory_limit, is_exclusive: false })
     }
 
     /// The file's bytes from `offset` on. Readers don't disturb each other.
@@ -114,7 +116,7 @@ impl LogFile {
             let what = format!("{what} claims {len} bytes, the file ends at {}", self.len);
             return Err(self.damaged(offset, what));
         }
-        if len > MEMORY_LIMIT {
+        if len > self.memory_limit {
             return Err(self.too_large(offset, what, len));
         }
         buf.clear();
@@ -162,7 +164,7 @@ impl LogFile {
     }
 
     pub(super) fn too_large(&self, offset: u64, what: &'static str, size: u64) -> LogError {
-        LogError::TooLarge { path: self.path.clone(), offset, what, size, limit: MEMORY_LIMIT }
+        LogError::TooLarge { path: self.path.clone(), offset, what, size, limit: self.memory_limit }
     }
 }
 

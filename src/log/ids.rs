@@ -24,7 +24,8 @@ pub(super) fn assign_ids(index: &Index, path: &Path, channels: &[NewChannel]) ->
     let mut free_schemas = free_ids(index.schemas.keys().copied().chain(schema_ids).collect(), 1);
     let used = index.chunks.iter().flat_map(|chunk| chunk.message_index_offsets.keys());
     let counted = index.statistics.iter().flat_map(|statistics| statistics.channel_message_counts.keys());
-    let mut free_channels = free_ids(index.channels.keys().chain(used).chain(counted).copied().collect(), 0);
+    let used = index.channels.keys().chain(used).chain(counted).chain(&index.reserved_ids);
+    let mut free_channels = free_ids(used.copied().collect(), 0);
 
     let mut schemas = BTreeMap::new();
     let mut assigned = Vec::new();

@@ -8,7 +8,7 @@ use super::file::{LogFile, parse};
 use super::{Log, LogError, chunk};
 
 /// Channel, sequence, two times, before a message's payload.
-const MESSAGE_HEADER_LEN: usize = 2 + 4 + 8 + 8;
+pub(super) const MESSAGE_HEADER_LEN: usize = 2 + 4 + 8 + 8;
 
 /// A message as it stands in the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

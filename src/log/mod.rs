@@ -1,7 +1,17 @@
 //! MCAP at both ends, and nothing else knows MCAP.
 //!
 //! A recording is read through its summary: [`Log::open`] costs the same whatever the chunks hold.
-//! Where the summary leaves something out, [`Log::open`] finds it in the data section instead.
+//! Where the summary leaves something out or is damaged, [`Log::open`] finds it in the data section instead:
+//!
+//! | what | where |
+//! |---|---|
+//! | the end of the data section, the summary behind it | `ending` |
+//! | the summary's entries held against the records that they name | `extents` |
+//! | records that it doesn't name | `gaps` |
+//! | what chunks hold, where nothing else tells | `contents`, `survey` |
+//! | what is left of a log that is cut off | `rescue` |
+//! | how readers shall find old and new messages | [`Visibility`] |
+//!
 //! New channels are put behind the old ones with an [`Appender`]:
 //!
 //! ```text
@@ -13,45 +23,54 @@
 //! So the original can be had out of the output again, bit for bit: [`Log::additions`].
 //!
 //! Nothing that a file claims is believed before it is checked: lengths against the file before
-//! memory is taken, checksums before content is handed on.
+//! memory is taken, checksums before content is handed on. What is wrong stands in [`Log::damage`].
 
 mod addition;
 mod append;
 mod chunk;
+mod contents;
 #[cfg(test)]
 mod crash;
+mod damage;
 pub mod decode;
 mod disk;
+mod ending;
 mod error;
 mod excerpt;
+mod extents;
 mod file;
 #[cfg(test)]
 mod fixture;
+mod gaps;
 mod ids;
 mod index;
 mod interrupt;
 mod messages;
 mod new_file;
 mod old_tail;
+mod open;
 mod output;
+mod rescue;
 mod restore;
 mod summary;
 mod survey;
 mod times;
 mod undo;
-mod whole_part;
+mod visibility;
 
 pub use addition::{Compression, NewChannel, NewMessage, NewMetadata};
 pub use append::{Appender, Written};
-pub use error::{LogError, Obstacle};
+pub use damage::Damage;
+pub use error::LogError;
 pub use excerpt::Excerpt;
-pub use index::{Index, LeftOut, Log, Schema};
+pub use index::{Index, LeftOut, Schema};
 pub use interrupt::{INTERRUPTION, Interruption};
 pub use mcap::records::{AttachmentIndex, Channel, ChunkIndex, MetadataIndex, Statistics};
 pub use messages::{Message, OwnedMessage};
 pub use new_file::write_new;
+pub use open::Log;
 pub use output::Destination;
 pub use restore::{Addition, restore_pending_to};
 pub use times::TimesRead;
 pub use undo::put_back;
-pub use whole_part::WholePart;
+pub use visibility::Visibility;

@@ -1,7 +1,8 @@
 //! The original's end, in an attachment: a log that was added to can be taken back to the original, bit for bit.
 //!
 //! The attachment `trackfuse:original-after-N` stands at offset N: the original is the first N bytes of the file,
-//! and then the attachment. Every addition brings its own; the first of them leads to the very original.
+//! and then the attachment. Every addition brings its own; the first of them leads to the very original. Only
+//! message indexes that a cut took away from the last chunk come between.
 
 use mcap::records::{AttachmentHeader, AttachmentIndex, op};
 
@@ -32,10 +33,10 @@ pub(super) fn summed(head: &[u8]) -> &[u8] {
     head.get(HEAD_LEN as usize..).unwrap_or_default()
 }
 
-/// The index of the attachment that begins with `head`.
-pub(super) fn index(data_end: u64, tail_len: u64, head: &[u8]) -> AttachmentIndex {
+/// The index of the attachment that begins with `head` at `offset`.
+pub(super) fn index(offset: u64, data_end: u64, tail_len: u64, head: &[u8]) -> AttachmentIndex {
     AttachmentIndex {
-        offset: data_end,
+        offset,
         length: head.len() as u64 + tail_len + CRC_LEN,
         log_time: 0,
         create_time: 0,
@@ -45,12 +46,7 @@ pub(super) fn index(data_end: u64, tail_len: u64, head: &[u8]) -> AttachmentInde
     }
 }
 
-/// Whether the attachment is one of these, and where it was put. After another program moved it, it leads nowhere.
-pub(super) fn is_one(attachment: &AttachmentIndex) -> bool {
-    is_named_so(attachment) && attachment.name.strip_prefix(NAME) == Some(&attachment.offset.to_string())
-}
-
-/// Whether the attachment was one of these, wherever it stands now.
-pub(super) fn is_named_so(attachment: &AttachmentIndex) -> bool {
-    attachment.name.starts_with(NAME)
+/// Where the original's data section ended, `None` where the attachment is none of these.
+pub(super) fn data_end(attachment: &AttachmentIndex) -> Option<u64> {
+    attachment.name.strip_prefix(NAME)?.parse().ok()
 }

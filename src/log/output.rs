@@ -60,15 +60,8 @@ impl Destination {
     /// Refuses a destination before any work is done for it.
     pub(super) fn check(&self, log: &Log) -> Result<(), LogError> {
         match self {
-            Self::New { out, force } => {
-                log.ensure_appendable()?;
-                check_output(log, out, *force)
-            }
-            Self::Sidecar { out, force } => check_output(log, out, *force),
-            Self::InPlace => {
-                log.ensure_appendable()?;
-                ensure_in_place(log)
-            }
+            Self::New { out, force } | Self::Sidecar { out, force } => check_output(log, out, *force),
+            Self::InPlace => ensure_in_place(log),
         }
     }
 }
@@ -266,8 +259,11 @@ pub(super) fn ensure_in_place(log: &Log) -> Result<(), LogError> {
     if !log.file.is_exclusive {
         return refuse("it was opened for reading only");
     }
-    if !log.ends_whole()? {
-        return refuse("its end is damaged");
+    if let Some(damage) = log.damage().first() {
+        return refuse(&format!("it is damaged at offset {}: {}", damage.offset, damage.what));
+    }
+    if !log.has_its_length() {
+        return refuse("somebody else changed it meanwhile");
     }
     #[cfg(unix)]
     {

@@ -3,7 +3,9 @@
 use std::io::Read;
 use std::path::Path;
 
-use super::file::{At, LogFile};
+use mcap::records::op;
+
+use super::file::{At, LogFile, MEMORY_LIMIT};
 use super::interrupt::Writing;
 use super::new_file::{check_name, publish, readable_by_the_same, temporary_beside};
 use super::output::{check_output, copy_behind, copy_start, ensure_in_place, is_same_file};
@@ -20,6 +22,8 @@ pub struct Addition {
     pub offset: u64,
     /// Length of the original in bytes.
     pub original_len: u64,
+    /// Where the attachment with the original's end begins.
+    attached_at: u64,
     /// Where the original's end stands in the log.
     tail_at: u64,
     /// Where the next addition begins.
@@ -41,9 +45,15 @@ impl Log {
     pub fn additions(&self) -> Result<Vec<Addition>, LogError> {
         let index = self.index();
         let mut additions: Vec<Addition> = Vec::new();
-        for found in index.attachments.iter().filter(|a| old_tail::is_one(a)) {
+        let mut moved = false;
+        for found in &index.attachments {
+            let Some(data_end) = old_tail::data_end(found) else { continue };
+            if !self.only_message_indexes(data_end, found.offset) {
+                moved = true;
+                continue;
+            }
             let tail_len = found.data_size;
-            let head = old_tail::head(found.offset, tail_len);
+            let head = old_tail::head(data_end, tail_len);
             let stands = self.file.bytes(found.offset, head.len() as u64, "an attachment")?;
             if stands != head {
                 return Err(self.file.damaged(found.offset, "the attachment with the original's end"));
@@ -52,22 +62,34 @@ impl Log {
                 before.end = found.offset;
             }
             additions.push(Addition {
-                offset: found.offset,
-                original_len: found.offset.saturating_add(tail_len),
+                offset: data_end,
+                original_len: data_end.saturating_add(tail_len),
+                attached_at: found.offset,
                 tail_at: found.offset + head.len() as u64,
                 end: index.data_end,
             });
         }
         if additions.is_empty() {
-            let moved = index.attachments.iter().any(old_tail::is_named_so);
             return Err(LogError::NothingAdded { path: self.path().to_owned(), moved });
         }
         Ok(additions)
     }
 
+    /// Whether nothing but message indexes stands in the file from `start` to `end`.
+    fn only_message_indexes(&self, start: u64, end: u64) -> bool {
+        let mut at = start;
+        while at < end {
+            match self.file.head(at, end) {
+                Ok(head) if head.opcode == op::MESSAGE_INDEX => at = head.end(),
+                _ => return false,
+            }
+        }
+        at == end
+    }
+
     /// Holds the original's end against its checksum, and its length against what was noted of it.
     fn verify(&self, addition: &Addition) -> Result<(), LogError> {
-        let Addition { offset, tail_at, .. } = *addition;
+        let Addition { offset, attached_at, tail_at, .. } = *addition;
         let tail_len = addition.tail_len();
         let cannot = |source| LogError::Read { path: self.path().to_owned(), offset: tail_at, source };
         let mut crc = crc32fast::Hasher::new();
@@ -83,7 +105,7 @@ impl Log {
         if found != said {
             let what =
                 format!("the CRC of the original's end is {found:08x}, the attachment says {said:08x}");
-            return Err(self.file.damaged(offset, what));
+            return Err(self.file.damaged(attached_at, what));
         }
         let of_this = |m: &&super::MetadataIndex| {
             m.name.starts_with(METADATA) && (addition.offset..addition.end).contains(&m.offset)
@@ -136,7 +158,7 @@ impl Log {
 /// [`LogError::InUse`] while that run goes on; [`LogError::BadUndo`]; errors of [`super::write_new`].
 pub fn restore_pending_to(path: &Path, out: &Path, force: bool) -> Result<Option<u64>, LogError> {
     let Some(pending) = undo::pending(path) else { return Ok(None) };
-    let log = LogFile::open_shared(path)?;
+    let log = LogFile::open_shared(path, MEMORY_LIMIT)?;
     if is_same_file(&log.file, path, out) {
         return Err(LogError::OutputIsInput { path: out.to_owned() });
     }

@@ -48,11 +48,19 @@ where
 
 /// Everything behind `DataEnd`: summary, summary offsets, footer, magic.
 ///
-/// `start` is where it will stand, `statistics` count old and new together.
-pub(super) fn tail(old: &Index, new: &[SummaryRecord], statistics: &Statistics, start: u64) -> Vec<u8> {
+/// `start` is where it will stand, `statistics` count old and new together; of the chunks it names those whose
+/// start `is_named`.
+pub(super) fn tail(
+    old: &Index,
+    new: &[SummaryRecord],
+    statistics: &Statistics,
+    start: u64,
+    is_named: impl Fn(u64) -> bool,
+) -> Vec<u8> {
     let statistics = [statistics_record(old, statistics)];
     let kept = old.summary.iter().filter(|record| record.opcode != op::STATISTICS);
-    let records: Vec<_> = kept.chain(&statistics).chain(new).collect();
+    let is_named = |record: &&SummaryRecord| record.chunk_start_offset().is_none_or(&is_named);
+    let records: Vec<_> = kept.chain(&statistics).chain(new).filter(is_named).collect();
 
     // Readers take counts by channel from the statistics, so channels must come before them.
     let mut groups = vec![op::SCHEMA, op::CHANNEL];
@@ -78,12 +86,20 @@ pub(super) fn tail(old: &Index, new: &[SummaryRecord], statistics: &Statistics, 
     }
     let offset_start = start + tail.len() as u64;
     tail.extend(offsets);
+    footed(tail, start, offset_start)
+}
 
+/// Footer and magic alone, of a log without a summary.
+pub(super) fn no_tail() -> Vec<u8> {
+    footed(Vec::new(), 0, 0)
+}
+
+fn footed(mut tail: Vec<u8>, summary_start: u64, summary_offset_start: u64) -> Vec<u8> {
     // The CRC spans the footer too, up to itself.
     tail.push(op::FOOTER);
     tail.extend(20_u64.to_le_bytes());
-    tail.extend(start.to_le_bytes());
-    tail.extend(offset_start.to_le_bytes());
+    tail.extend(summary_start.to_le_bytes());
+    tail.extend(summary_offset_start.to_le_bytes());
     tail.extend(crc32fast::hash(&tail).to_le_bytes());
     tail.extend_from_slice(MAGIC);
     tail

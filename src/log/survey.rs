@@ -4,47 +4,72 @@
 //! ones from readers that trust it, so what it leaves out is looked up: the gaps between the
 //! indexed parts from record to record, chunks' contents only where nothing else tells.
 
-use std::{collections::BTreeSet, ops::Range};
+use std::collections::BTreeSet;
 
-use mcap::records::{
-    AttachmentHeader, AttachmentIndex, Channel, ChunkIndex, MessageHeader, MetadataIndex, Statistics, op,
-};
+use mcap::records::{Channel, ChunkIndex, Statistics, op};
 
 use super::chunk::{self, Block};
-use super::file::{HEAD_LEN, Head, LogFile, parse};
-use super::index::{LeftOut, Schema, SummaryRecord, read_record};
+use super::contents::{self, Closed, Contents, look_into};
+use super::damage::Damages;
+use super::extents;
+use super::file::{HEAD_LEN, LogFile, parse};
+use super::gaps::Gaps;
+use super::index::{LeftOut, Schema, SummaryRecord};
+use super::rescue::TornChunk;
 use super::summary::encode;
-use super::{Index, LogError, Obstacle};
+use super::visibility::Visibility;
+use super::{Index, LogError};
 
-/// Runs of loose records are cut into pieces of about this size, which are read at once.
-const LOOSE_PIECE: u64 = 4 << 20;
-/// Enough for an attachment's times, name and media type.
-const LONGEST_ATTACHMENT_HEADER: u64 = 1 << 20;
-
-/// Checks `index` against the file and adds what is missing. The answer is the first thing, if
-/// any, that stands against adding channels.
-pub(super) fn complete(file: &LogFile, index: &mut Index) -> Result<Option<Obstacle>, LogError> {
+/// Checks `index` against the file and adds what is missing. The answer is how readers of a successor will find
+/// the messages, and where the data section first holds bytes that are no record.
+pub(super) fn complete(
+    file: &LogFile,
+    index: &mut Index,
+    damages: &mut Damages,
+) -> Result<(Visibility, Option<u64>), LogError> {
     let summarised = counts(index);
-    let known = check_extents(file, index)?;
-    let mut gaps = Gaps { file, index, schemas: Vec::new(), loose: None, garbage: None };
+    let entries = index.chunks.len() + index.attachments.len() + index.metadata.len();
+    let known = extents::check(file, index, damages)?;
+    let contradicted = known.len() < entries;
+    // Viewers scan a log whose summary has no channels, whatever its chunk index.
+    let read_by_index = !index.chunks.is_empty() && !index.channels.is_empty();
+
+    let data_end = index.data_end;
+    let mut gaps = Gaps {
+        file,
+        index,
+        damages,
+        definitions: Vec::new(),
+        loose: None,
+        garbage: None,
+        chunks: BTreeSet::new(),
+    };
     let mut position = gaps.index.data_start;
     for extent in known {
         gaps.walk(position..extent.start)?;
         position = extent.end;
     }
-    gaps.walk(position..gaps.index.data_end)?;
-    let Gaps { schemas, loose, garbage, .. } = gaps;
-    for (opcode, bytes) in schemas {
-        adopt(index, opcode, &bytes).map_err(|problem| file.damaged(index.data_start, problem))?;
+    gaps.walk(position..data_end)?;
+    let Gaps { definitions, loose, garbage, chunks: unnamed, .. } = gaps;
+    for (opcode, bytes) in definitions {
+        let adopted = adopt(index, opcode, &bytes);
+        adopted.unwrap_or_else(|problem| damages.push(index.data_start, problem));
     }
     index.chunks.sort_by_key(|chunk| chunk.chunk_start_offset);
     index.attachments.sort_by_key(|attachment| attachment.offset);
     index.metadata.sort_by_key(|metadata| metadata.offset);
+    tear(index);
 
-    let scanned = !is_complete(index);
+    let mut survey = Survey { file, index, damages, unnamed, hidden: loose, closed: false, buf: Vec::new() };
+    let miscounted = survey.miscounted_records();
+    let distrusted = contradicted || miscounted || survey.index.summary_distrusted;
+    let scanned = distrusted || !is_complete(survey.index);
     if scanned {
-        scan(file, index)?;
+        survey.scan()?;
+    } else if survey.hidden.is_none() {
+        survey.find_hidden()?;
     }
+    let visibility = survey.visibility(read_by_index);
     let found = counts(index);
     index.left_out = LeftOut {
         schemas: found.schemas.saturating_sub(summarised.schemas),
@@ -55,13 +80,7 @@ pub(super) fn complete(file: &LogFile, index: &mut Index) -> Result<Option<Obsta
         statistics: found.statistics && !summarised.statistics,
         scanned,
     };
-    if let Some(offset) = garbage {
-        return Ok(Some(Obstacle::Garbage { offset }));
-    }
-    if let Some(offset) = loose {
-        return Ok(Some(Obstacle::LooseMessages { offset }));
-    }
-    first_without_message_index(file, index)
+    Ok((visibility, garbage))
 }
 
 /// How much the index holds.
@@ -77,176 +96,18 @@ fn counts(index: &Index) -> LeftOut {
     }
 }
 
-/// Where the indexed parts of the data section stand, in order; each is what the index says.
-fn check_extents(file: &LogFile, index: &Index) -> Result<Vec<Range<u64>>, LogError> {
-    let chunks = index
-        .chunks
-        .iter()
-        .map(|c| (op::CHUNK, "chunk", c.chunk_start_offset, c.chunk_length, c.message_index_length));
-    let attachments = index.attachments.iter().map(|a| (op::ATTACHMENT, "attachment", a.offset, a.length, 0));
-    let metadata = index.metadata.iter().map(|m| (op::METADATA, "metadata", m.offset, m.length, 0));
-
-    let mut extents = Vec::new();
-    for (opcode, what, offset, len, behind) in chunks.chain(attachments).chain(metadata) {
-        let end = offset.checked_add(len).and_then(|end| end.checked_add(behind));
-        if end.is_none_or(|end| offset < index.data_start || end > index.data_end) {
-            let what = format!(
-                "the {what} index says {len} + {behind} bytes stand here, outside the data section [{}, {})",
-                index.data_start, index.data_end
-            );
-            return Err(file.damaged(offset, what));
-        }
-        let head = file.head(offset, index.data_end)?;
-        if head.opcode != opcode || head.end() != offset + len {
-            let found = head.end() - offset;
-            let what = format!(
-                "the {what} index says a record of {len} bytes (opcode {opcode:#04x}) stands here, found {found} bytes (opcode {:#04x})",
-                head.opcode
-            );
-            return Err(file.damaged(offset, what));
-        }
-        // Message indexes behind a chunk are walked like a gap: something else may stand among them.
-        extents.push(offset..head.end());
-    }
-    for chunk in &index.chunks {
-        let chunk_end = chunk.chunk_start_offset + chunk.chunk_length;
-        if let Some((channel, offset)) = chunk
-            .message_index_offsets
-            .iter()
-            .find(|(_, offset)| !(chunk_end..index.data_end).contains(offset))
-        {
-            let what =
-                format!("the message index of channel {channel} is said to stand at {offset}, not behind it");
-            return Err(file.damaged(chunk.chunk_start_offset, what));
-        }
-    }
-    extents.sort_by_key(|extent| extent.start);
-    if let Some((a, b)) = extents.iter().zip(extents.iter().skip(1)).find(|(a, b)| a.end > b.start) {
-        return Err(file.damaged(b.start, format!("indexed again, within the record indexed at {}", a.start)));
-    }
-    Ok(extents)
-}
-
-/// What was found between the indexed parts.
-struct Gaps<'a> {
-    file: &'a LogFile,
-    index: &'a mut Index,
-    /// Schemas and channels outside chunks, whole records.
-    schemas: Vec<(u8, Vec<u8>)>,
-    loose: Option<u64>,
-    garbage: Option<u64>,
-}
-
-impl Gaps<'_> {
-    /// Goes from record to record, reading heads, and bodies only of what is worth indexing.
-    fn walk(&mut self, gap: Range<u64>) -> Result<(), LogError> {
-        let mut position = gap.start;
-        // The chunk that message indexes right behind it belong to.
-        let mut chunk: Option<ChunkIndex> = None;
-        while position < gap.end {
-            let Ok(head) = self.file.head(position, gap.end) else {
-                self.garbage.get_or_insert(position);
-                break;
-            };
-            if let (op::MESSAGE_INDEX, Some(chunk)) = (head.opcode, &mut chunk) {
-                let id = self.file.bytes(head.body(), head.body_len.min(2), "a message index")?;
-                let id: u16 = self.file.parse(position, "message index", &id)?;
-                chunk.message_index_offsets.insert(id, position);
-                chunk.message_index_length += head.end() - position;
-            } else {
-                self.add_chunk(chunk.take())?;
-                if self.record(head, &mut chunk)? {
-                    self.garbage.get_or_insert(position);
-                    break;
-                }
-            }
-            position = head.end();
-        }
-        self.add_chunk(chunk)
-    }
-
-    /// Takes one record in. The answer is whether it can't stand in a data section.
-    fn record(&mut self, head: Head, chunk: &mut Option<ChunkIndex>) -> Result<bool, LogError> {
-        match head.opcode {
-            op::MESSAGE => {
-                self.loose.get_or_insert(head.offset);
-                self.add_loose(head);
-            }
-            op::SCHEMA | op::CHANNEL => {
-                let len = head.end() - head.offset;
-                let bytes = self.file.bytes(head.offset, len, "a schema or channel")?;
-                self.schemas.push((head.opcode, bytes));
-                self.add_loose(head);
-            }
-            op::CHUNK => {
-                let (header, _) = chunk::read_header(self.file, head.offset, head.end())?;
-                *chunk = Some(ChunkIndex {
-                    message_start_time: header.message_start_time,
-                    message_end_time: header.message_end_time,
-                    chunk_start_offset: head.offset,
-                    chunk_length: head.end() - head.offset,
-                    message_index_offsets: [].into(),
-                    message_index_length: 0,
-                    compression: header.compression,
-                    compressed_size: header.compressed_size,
-                    uncompressed_size: header.uncompressed_size,
-                });
-            }
-            op::ATTACHMENT => self.add_attachment(head)?,
-            op::METADATA => {
-                let metadata: mcap::records::Metadata = read_record(self.file, head, "metadata")?;
-                let length = head.end() - head.offset;
-                let entry = MetadataIndex { offset: head.offset, length, name: metadata.name };
-                self.add(op::METADATA_INDEX, encode(op::METADATA_INDEX, &entry))?;
-            }
-            // Reserved, or somebody's own; skipped as the format asks.
-            op::MESSAGE_INDEX | 0x10.. => {}
-            _ => return Ok(true),
-        }
-        Ok(false)
-    }
-
-    fn add_chunk(&mut self, chunk: Option<ChunkIndex>) -> Result<(), LogError> {
-        match chunk {
-            None => Ok(()),
-            Some(chunk) => self.add(op::CHUNK_INDEX, encode(op::CHUNK_INDEX, &chunk)),
-        }
-    }
-
-    fn add_loose(&mut self, head: Head) {
-        match self.index.loose.last_mut() {
-            Some(run) if run.end == head.offset && head.end() - run.start <= LOOSE_PIECE => {
-                run.end = head.end();
-            }
-            _ => self.index.loose.push(head.offset..head.end()),
-        }
-    }
-
-    fn add_attachment(&mut self, head: Head) -> Result<(), LogError> {
-        let bytes =
-            self.file.bytes(head.body(), head.body_len.min(LONGEST_ATTACHMENT_HEADER), "an attachment")?;
-        let header: AttachmentHeader = self.file.parse(head.offset, "attachment", &bytes)?;
-        // Two times, and two strings with their lengths; then the length of the data.
-        let data_size_at = 8 + 8 + 4 + header.name.len() + 4 + header.media_type.len();
-        let rest = bytes.get(data_size_at..).unwrap_or_default();
-        let data_size: u64 = self.file.parse(head.offset, "attachment", rest)?;
-        let entry = AttachmentIndex {
-            offset: head.offset,
-            length: head.end() - head.offset,
-            log_time: header.log_time,
-            create_time: header.create_time,
-            data_size,
-            name: header.name,
-            media_type: header.media_type,
-        };
-        self.add(op::ATTACHMENT_INDEX, encode(op::ATTACHMENT_INDEX, &entry))
-    }
-
-    fn add(&mut self, opcode: u8, bytes: Vec<u8>) -> Result<(), LogError> {
-        let inserted = self.index.insert(opcode, bytes.get(HEAD_LEN as usize..).unwrap_or_default());
-        inserted.map_err(|problem| self.file.damaged(self.index.data_start, problem))?;
-        self.index.summary.push(SummaryRecord { opcode, bytes });
-        Ok(())
+/// Sets the last chunk apart where the log is cut off among its message indexes: those that are there don't tell
+/// all that it holds.
+fn tear(index: &mut Index) {
+    let data_end = index.data_end;
+    let Some(chunk) = index.chunks.last_mut().filter(|_| index.is_cut && index.cut_chunk.is_none()) else {
+        return;
+    };
+    if chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length == data_end {
+        let torn = TornChunk { whole: chunk.clone() };
+        chunk.message_index_offsets.clear();
+        chunk.message_index_length = 0;
+        index.torn_chunk = Some(torn);
     }
 }
 
@@ -277,66 +138,214 @@ fn is_complete(index: &Index) -> bool {
         && schemas.into_iter().all(|id| id == 0 || index.schemas.contains_key(&id))
 }
 
-/// Reads every chunk for the schemas and channels that the summary leaves out, and counts.
-fn scan(file: &LogFile, index: &mut Index) -> Result<(), LogError> {
-    let mut found = Vec::new();
-    let mut seen = BTreeSet::new();
-    let mut counted = Statistics::default();
-    chunk::for_each_record(file, chunk::blocks(index), |block, record| {
-        let bad = |problem| file.damaged(block.offset(), format!("the chunk: {problem}"));
-        match record.opcode {
-            op::MESSAGE => {
-                let header: MessageHeader = parse(record.body).map_err(bad)?;
-                count(&mut counted, &header);
-            }
-            // The id is the first field of both.
-            op::SCHEMA | op::CHANNEL
-                if seen.insert((record.opcode, parse::<u16>(record.body).map_err(bad)?)) =>
-            {
-                found.push((record.opcode, record.whole.to_vec(), block.offset()));
-            }
-            _ => {}
+/// The look into chunks, where the summary doesn't tell what they hold.
+struct Survey<'a> {
+    file: &'a LogFile,
+    index: &'a mut Index,
+    damages: &'a mut Damages,
+    /// Chunks that the summary didn't name.
+    unnamed: BTreeSet<u64>,
+    /// The first part with messages that no index names.
+    hidden: Option<u64>,
+    /// Whether a chunk couldn't be looked into that may be whole.
+    closed: bool,
+    buf: Vec<u8>,
+}
+
+impl Survey<'_> {
+    /// Whether the statistics count other numbers of records than the data section has.
+    fn miscounted_records(&mut self) -> bool {
+        let Some(statistics) = &self.index.statistics else { return false };
+        let counted = [
+            ("chunks", statistics.chunk_count, self.index.chunks.len()),
+            ("attachments", statistics.attachment_count, self.index.attachments.len()),
+            ("metadata records", statistics.metadata_count, self.index.metadata.len()),
+        ];
+        let wrong: Vec<_> =
+            counted.iter().filter(|(_, claimed, found)| *claimed as usize != *found).collect();
+        for (what, claimed, found) in &wrong {
+            let what = format!("the statistics count {claimed} {what}, there are {found}");
+            self.damages.push(self.index.summary_start.unwrap_or(self.index.data_end), what);
         }
-        Ok::<_, LogError>(())
-    })?;
-    for (opcode, bytes, offset) in found {
-        adopt(index, opcode, &bytes).map_err(|problem| file.damaged(offset, problem))?;
+        !wrong.is_empty()
     }
-    if index.statistics.is_none() {
+
+    /// Looks for messages that no index names, reading as little as that takes.
+    fn find_hidden(&mut self) -> Result<(), LogError> {
+        let unclear = |chunk: &&ChunkIndex| {
+            chunk.message_index_offsets.is_empty() || self.unnamed.contains(&chunk.chunk_start_offset)
+        };
+        let unclear: Vec<ChunkIndex> = self.index.chunks.iter().filter(unclear).cloned().collect();
+        for chunk in unclear {
+            self.look(&Block::Chunk(&chunk))?;
+            if self.hidden.is_some() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads every chunk for the schemas and channels that the summary leaves out, and counts.
+    fn scan(&mut self) -> Result<(), LogError> {
+        let of_index = Index { summary: Vec::new(), ..self.index.clone() };
+        let mut counted = Statistics::default();
+        for block in chunk::blocks(&of_index) {
+            let Some(Contents { definitions, counted: of_block }) = self.look(&block)? else { continue };
+            contents::add(&mut counted, &of_block);
+            for (opcode, bytes) in definitions {
+                let adopted = adopt(self.index, opcode, &bytes);
+                adopted.unwrap_or_else(|problem| self.damages.push(block.offset(), problem));
+            }
+        }
+        self.count(counted);
+        Ok(())
+    }
+
+    /// Looks into one part, and takes it out of the index where it can't be decoded.
+    fn look(&mut self, block: &Block<'_>) -> Result<Option<Contents>, LogError> {
+        let looked = look_into(self.file, block, &mut self.buf)?;
+        let offset = block.offset();
+        if let Block::Cut(_) = block {
+            self.saved(&looked);
+        }
+        match (looked, block) {
+            (Ok(contents), Block::Chunk(chunk)) => {
+                if self.hides(chunk, &contents) {
+                    self.hidden = Some(self.hidden.map_or(offset, |first| first.min(offset)));
+                }
+                Ok(Some(contents))
+            }
+            (Ok(contents), _) => Ok(Some(contents)),
+            (Err(Closed::Undecodable(why)), Block::Chunk(chunk)) => {
+                self.damages.push(offset, why);
+                self.index.undecodable += 1;
+                self.index.reserved_ids.extend(chunk.message_index_offsets.keys());
+                self.drop_chunks(&[offset].into());
+                self.index.chunks.retain(|chunk| chunk.chunk_start_offset != offset);
+                Ok(None)
+            }
+            (Err(Closed::Unread(why)), Block::Chunk(chunk)) => {
+                self.damages.push(offset, why);
+                self.closed = true;
+                if chunk.message_index_offsets.is_empty() {
+                    self.hidden.get_or_insert(offset);
+                }
+                Ok(None)
+            }
+            (Err(Closed::Undecodable(why) | Closed::Unread(why)), _) => {
+                self.damages.push(offset, why);
+                Ok(None)
+            }
+        }
+    }
+
+    /// What could be saved of the chunk at which the log is cut off.
+    fn saved(&mut self, looked: &Result<Contents, Closed>) {
+        let Some(cut) = &mut self.index.cut_chunk else { return };
+        match looked {
+            Ok(contents) => {
+                let messages = contents.counted.message_count;
+                let what = format!(
+                    "{messages} messages of the chunk that is cut off are saved, which no checksum covers"
+                );
+                self.damages.push(cut.offset, what);
+                cut.saved_bytes = self.buf.len() as u64;
+            }
+            Err(_) => self.index.cut_chunk = None,
+        }
+    }
+
+    /// Whether some readers don't find a chunk's messages through an index.
+    fn hides(&self, chunk: &ChunkIndex, contents: &Contents) -> bool {
+        let offset = chunk.chunk_start_offset;
+        if contents.counted.message_count == 0 || self.torn() == Some(offset) {
+            return false;
+        }
+        if self.unnamed.contains(&offset) {
+            return !contents::is_indexed(self.file, chunk, &contents.counted);
+        }
+        chunk.message_index_offsets.is_empty()
+    }
+
+    fn torn(&self) -> Option<u64> {
+        self.index.torn_chunk.as_ref().map(|torn| torn.whole.chunk_start_offset)
+    }
+
+    /// Puts what was counted in place of statistics that are missing or wrong.
+    fn count(&mut self, mut counted: Statistics) {
+        let index = &mut *self.index;
         counted.schema_count = index.schemas.len() as u16;
         counted.channel_count = index.channels.len() as u32;
         counted.attachment_count = index.attachments.len() as u32;
         counted.metadata_count = index.metadata.len() as u32;
-        counted.chunk_count = index.chunks.len() as u32;
+        counted.chunk_count = (index.chunks.len() + index.undecodable) as u32;
+        if let Some(claimed) = &index.statistics {
+            let same = is_same(claimed, &counted);
+            if same || self.closed {
+                return;
+            }
+            if self.damages.found.is_empty() {
+                let what = format!(
+                    "the statistics are wrong: {} messages of {} .. {} ns, there are {} of {} .. {} ns",
+                    claimed.message_count,
+                    claimed.message_start_time,
+                    claimed.message_end_time,
+                    counted.message_count,
+                    counted.message_start_time,
+                    counted.message_end_time
+                );
+                self.damages.push(index.summary_start.unwrap_or(index.data_end), what);
+            }
+        }
+        index.summary.retain(|record| record.opcode != op::STATISTICS);
         index.summary.push(SummaryRecord { opcode: op::STATISTICS, bytes: encode(op::STATISTICS, &counted) });
         index.statistics = Some(counted);
     }
-    Ok(())
-}
 
-/// Counts a message in.
-pub(super) fn count(statistics: &mut Statistics, message: &MessageHeader) {
-    let time = message.log_time;
-    let (start, end) = match statistics.message_count {
-        0 => (time, time),
-        _ => (statistics.message_start_time.min(time), statistics.message_end_time.max(time)),
-    };
-    statistics.message_start_time = start;
-    statistics.message_end_time = end;
-    // Saturating, since old counts may be anything.
-    statistics.message_count = statistics.message_count.saturating_add(1);
-    let counted = statistics.channel_message_counts.entry(message.channel_id).or_default();
-    *counted = counted.saturating_add(1);
-}
+    /// What follows for a successor; its summary won't name what it must not.
+    fn visibility(&mut self, read_by_index: bool) -> Visibility {
+        let Some(offset) = self.hidden else {
+            // `@mcap/core` gives up at a chunk index with times and without message indexes.
+            let empty = |chunk: &&ChunkIndex| {
+                self.unnamed.contains(&chunk.chunk_start_offset)
+                    && chunk.message_index_offsets.is_empty()
+                    && (chunk.message_start_time, chunk.message_end_time) != (0, 0)
+            };
+            let empty =
+                self.index.chunks.iter().filter(empty).map(|chunk| chunk.chunk_start_offset).collect();
+            self.drop_chunks(&empty);
+            return Visibility::Indexed;
+        };
+        if read_by_index {
+            let unnamed = std::mem::take(&mut self.unnamed);
+            self.drop_chunks(&unnamed);
+            return Visibility::Partly { offset };
+        }
+        Visibility::Scanned { offset, summary: self.index.summary_start.is_some() }
+    }
 
-/// The first chunk that holds messages and no message index. Only chunks without one are read.
-fn first_without_message_index(file: &LogFile, index: &Index) -> Result<Option<Obstacle>, LogError> {
-    let mut buf = Vec::new();
-    for chunk in index.chunks.iter().filter(|chunk| chunk.message_index_offsets.is_empty()) {
-        chunk::read_block(file, &Block::Chunk(chunk), &mut buf)?;
-        if chunk::records(&buf).flatten().any(|record| record.opcode == op::MESSAGE) {
-            return Ok(Some(Obstacle::NoMessageIndex { offset: chunk.chunk_start_offset }));
+    /// Takes chunks out of the summary.
+    fn drop_chunks(&mut self, offsets: &BTreeSet<u64>) {
+        if !offsets.is_empty() {
+            let dropped = |record: &SummaryRecord| {
+                record.chunk_start_offset().is_some_and(|offset| offsets.contains(&offset))
+            };
+            self.index.summary.retain(|record| !dropped(record));
         }
     }
-    Ok(None)
+}
+
+/// Whether statistics are what was counted; counts by channel may be left out, and those of none.
+fn is_same(claimed: &Statistics, counted: &Statistics) -> bool {
+    let times = |s: &Statistics| (s.message_start_time, s.message_end_time);
+    let by_channel = |s: &Statistics| {
+        let counts = s.channel_message_counts.iter().filter(|(_, messages)| **messages > 0);
+        counts.map(|(&id, &messages)| (id, messages)).collect::<Vec<_>>()
+    };
+    claimed.message_count == counted.message_count
+        && (claimed.message_count == 0 || times(claimed) == times(counted))
+        && (claimed.channel_message_counts.is_empty() || by_channel(claimed) == by_channel(counted))
+        && claimed.chunk_count == counted.chunk_count
+        && claimed.attachment_count == counted.attachment_count
+        && claimed.metadata_count == counted.metadata_count
 }

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use mcap::records::{ChunkIndex, op};
 
 use super::chunk::{self, Block};
-use super::file::parse;
+use super::file::{LogFile, parse};
 use super::{Log, LogError};
 
 /// What was found beside the times.
@@ -45,7 +45,7 @@ impl Log {
         for block in self.blocks() {
             if let Block::Chunk(chunk) = &block {
                 read.chunks_without_crc += usize::from(self.lacks_crc(chunk) == Some(true));
-                if self.message_index(chunk, &mut index, &mut f) {
+                if message_index(&self.file, chunk, &mut index, &mut f) {
                     read.indexed += 1;
                     continue;
                 }
@@ -76,26 +76,31 @@ impl Log {
         let (header, _) = chunk::read_header(&self.file, chunk.chunk_start_offset, end).ok()?;
         Some(header.uncompressed_crc == 0)
     }
+}
 
-    /// Hands on what stands in a chunk's message indexes; false where they are not all right behind it.
-    fn message_index(&self, chunk: &ChunkIndex, buf: &mut Vec<u8>, f: &mut impl FnMut(u16, &[u64])) -> bool {
-        let start = chunk.chunk_start_offset.saturating_add(chunk.chunk_length);
-        if chunk.message_index_offsets.is_empty()
-            || self.file.read_into(start, chunk.message_index_length, "message indexes", buf).is_err()
-        {
-            return false;
-        }
-        let records = chunk::records(buf).map_while(Result::ok).filter(|r| r.opcode == op::MESSAGE_INDEX);
-        let Some(channels) = records.map(|record| entries(record.body)).collect::<Option<Vec<_>>>() else {
-            return false;
-        };
-        let found: BTreeSet<u16> = channels.iter().map(|(id, _)| *id).collect();
-        if found.len() != channels.len() || !chunk.message_index_offsets.keys().all(|id| found.contains(id)) {
-            return false;
-        }
-        channels.iter().for_each(|(id, times)| f(*id, times));
-        true
+/// Hands on what stands in a chunk's message indexes; false where they are not all right behind it.
+pub(super) fn message_index(
+    file: &LogFile,
+    chunk: &ChunkIndex,
+    buf: &mut Vec<u8>,
+    f: &mut impl FnMut(u16, &[u64]),
+) -> bool {
+    let start = chunk.chunk_start_offset.saturating_add(chunk.chunk_length);
+    if chunk.message_index_offsets.is_empty()
+        || file.read_into(start, chunk.message_index_length, "message indexes", buf).is_err()
+    {
+        return false;
     }
+    let records = chunk::records(buf).map_while(Result::ok).filter(|r| r.opcode == op::MESSAGE_INDEX);
+    let Some(channels) = records.map(|record| entries(record.body)).collect::<Option<Vec<_>>>() else {
+        return false;
+    };
+    let found: BTreeSet<u16> = channels.iter().map(|(id, _)| *id).collect();
+    if found.len() != channels.len() || !chunk.message_index_offsets.keys().all(|id| found.contains(id)) {
+        return false;
+    }
+    channels.iter().for_each(|(id, times)| f(*id, times));
+    true
 }
 
 /// A message index's channel, and its messages' times in the order in which they stand in the chunk.

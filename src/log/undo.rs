@@ -22,7 +22,7 @@ use std::{
 
 use super::LogError;
 use super::disk;
-use super::file::{At, LogFile};
+use super::file::{At, LogFile, MEMORY_LIMIT};
 use super::new_file::{create_new, readable_by_the_same};
 
 const LINE: &[u8] =
@@ -182,7 +182,7 @@ pub fn put_back(path: &Path) -> Result<Option<u64>, LogError> {
         sweep(path);
         return Ok(None);
     };
-    let log = LogFile::open_exclusive(path)?;
+    let log = LogFile::open_exclusive(path, MEMORY_LIMIT)?;
     // the other run may have ended meanwhile
     if fs::symlink_metadata(&pending).is_err() {
         return Ok(None);
@@ -196,7 +196,7 @@ pub fn put_back(path: &Path) -> Result<Option<u64>, LogError> {
 fn sweep(path: &Path) {
     let Ok(undo) = beside(path) else { return };
     let part = disk::with_suffix(&undo, "-part");
-    if fs::symlink_metadata(&part).is_ok() && LogFile::open_exclusive(path).is_ok() {
+    if fs::symlink_metadata(&part).is_ok() && LogFile::open_exclusive(path, MEMORY_LIMIT).is_ok() {
         let _ = disk::remove(&part);
     }
 }

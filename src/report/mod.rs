@@ -62,6 +62,8 @@ pub struct Report {
     pub extrapolation: Option<ExtrapolationReport>,
     /// Characteristic points that were reached.
     pub characteristic_points: Vec<EventReport>,
+    /// What is good to know of the output, and harms nothing.
+    pub notes: Vec<String>,
     /// What a person must read.
     pub warnings: Vec<String>,
 }
@@ -252,6 +254,8 @@ pub struct Parts<'a> {
     pub plan: &'a Plan,
     /// What came of it.
     pub fusion: &'a Fusion,
+    /// What is good to know of the output.
+    pub notes: &'a [String],
     /// All that a person must read.
     pub warnings: &'a [String],
 }
@@ -260,7 +264,7 @@ impl Report {
     /// Puts a report together.
     #[must_use]
     pub fn new(parts: &Parts<'_>) -> Self {
-        let Parts { input, output, t0, loaded, datum, unused, plan, fusion, warnings } = *parts;
+        let Parts { input, output, t0, loaded, datum, unused, plan, fusion, notes, warnings } = *parts;
         let since_t0 = |s: f64| plan.origin.plus_seconds(s).seconds_since(t0);
         let span = |(a, b): (f64, f64)| (since_t0(a), since_t0(b));
         let known = |sigma: f64| Some(sigma).filter(|s| s.is_finite());
@@ -349,6 +353,7 @@ impl Report {
                     phase: e.phase.name().into(),
                 })
                 .collect(),
+            notes: notes.to_vec(),
             warnings: warnings.to_vec(),
         }
     }

@@ -59,6 +59,10 @@ fn write_page(out: &mut String, report: &Report) -> fmt::Result {
         writeln!(out)?;
         events(out, report)?;
     }
+    if !report.notes.is_empty() {
+        writeln!(out)?;
+    }
+    report.notes.iter().try_for_each(|note| writeln!(out, "note: {}", printable(note)))?;
     warnings(out, &report.warnings)
 }
 

@@ -1,12 +1,13 @@
 //! Logs and messages that are not as they should be.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::time::Instant;
 
 use mcap::WriteOptions;
 use serde_json::{Value, json};
 
-use super::trial::{Trial, assert_says};
+use super::trial::{Trial, assert_says, trackfuse};
 use super::trial_log::{
     Cdr, EPOCH_NS, POSE_STAMPED, Sensor, TrialLog, changed, definition, ns, odometry, odometry_definition,
     position, stamp, two_sensors, xyz,
@@ -16,7 +17,7 @@ use super::trial_log::{
 fn bad_input_that_is_no_log_is_named_with_what_it_is() {
     assert_says(&Trial::of("").error(1), &["\"in.mcap\" is not an MCAP", "empty", "\nhint: "]);
     assert_says(&Trial::of("#ROSBAG V2.0\n").error(1), &["is not an MCAP", "\nhint: ", "bag"]);
-    assert_says(&Trial::of(&two_sensors()[..20_000]).error(1), &["cut off", "\nhint: ", "mcap recover"]);
+    assert_says(&Trial::of(&two_sensors()[..20]).error(1), &["damaged at offset 8", "\nhint: "]);
     let trial = Trial::of(two_sensors());
     fs::create_dir(trial.path("folder")).unwrap();
     for (args, parts) in [
@@ -30,15 +31,67 @@ fn bad_input_that_is_no_log_is_named_with_what_it_is() {
 }
 
 #[test]
-fn bad_input_without_an_index_is_refused_with_a_way_out() {
+fn input_that_no_index_can_name_is_added_to_and_readers_scan_as_before() {
     let loose = || WriteOptions::new().use_chunks(false);
-    let unindexed = || WriteOptions::new().emit_message_indexes(false);
-    for (options, says) in [(loose(), "messages stand outside chunks"), (unindexed(), "has no message index")]
-    {
+    let unindexed = || WriteOptions::new().emit_message_indexes(false).emit_chunk_indexes(false);
+    for options in [loose(), unindexed()] {
         let mut log = TrialLog::with(options);
         log.sensor("/tether/track", &Sensor::new(0.0, 8.0, 1));
-        let error = Trial::of(log.finish()).error(1);
-        assert_says(&error, &["cannot safely add channels to \"in.mcap\"", says, "\nhint: ", "mcap recover"]);
+        let trial = Trial::of(log.finish());
+        let ran = trackfuse(trial.folder(), &["fuse", "in.mcap"]);
+        assert_eq!((ran.code, ran.stderr.as_str()), (0, ""), "{ran:#?}");
+        assert_says(
+            &ran.stdout,
+            &["note: the log has messages that no index can name", "must scan the output"],
+        );
+        let output = fs::read(trial.path("in.fused.mcap")).unwrap();
+        assert!(mcap::Summary::read(&output).unwrap().unwrap().chunk_indexes.is_empty());
+        let topics: BTreeSet<String> = mcap::MessageStream::new(&output)
+            .unwrap()
+            .map(|message| message.unwrap().channel.topic.clone())
+            .collect();
+        assert!(["/tether/track", "/fused/track"].iter().all(|topic| topics.contains(*topic)), "{topics:?}");
+    }
+}
+
+#[test]
+fn bad_input_that_is_cut_off_or_damaged_is_used_as_far_as_it_can_be_trusted() {
+    let bytes = two_sensors();
+    let mut garbage = bytes.clone();
+    garbage.extend(b"garbage");
+    let mut summary = bytes.clone();
+    let at = summary.len() - 100;
+    summary[at] ^= 0xff;
+    for (input, says) in [
+        (&bytes[..bytes.len() * 9 / 10], "the log is cut off"),
+        (&garbage, "7 bytes stand behind the log's end"),
+        (&summary, "the summary's CRC is"),
+    ] {
+        let trial = Trial::of(input);
+        let strict = trial.fuse(&["--strict"]);
+        assert_eq!(strict.code, 1);
+        assert_says(
+            &strict.stderr,
+            &["error: \"in.mcap\" is damaged at offset ", "\nhint: without `--strict`"],
+        );
+        let ran = trial.fuse(&[]);
+        assert_eq!(ran.code, 3, "{ran:#?}");
+        assert_says(&ran.stderr, &["warning: \"in.mcap\" is damaged at offset ", says]);
+        assert_says(&ran.stdout, &["warning: \"in.mcap\" is damaged at offset ", says]);
+        let init = trackfuse(trial.folder(), &["init", "in.mcap"]);
+        assert_eq!(init.code, 3);
+        assert_says(&init.stderr, &[says]);
+        for command in ["export", "compare"] {
+            let reference = ["--reference", "/tether/track"];
+            let of: &[&str] = if command == "compare" { &reference } else { &[] };
+            let whole = trackfuse(trial.folder(), &[&[command, "in.fused.mcap"], of].concat());
+            assert!(!whole.stderr.contains("damaged"), "the output of a damaged log is whole: {whole:#?}");
+            let topic = if command == "compare" { "--estimate" } else { "--topic" };
+            let args = [&[command, "in.mcap", topic, "/beacon/track"], of].concat();
+            assert_says(&trackfuse(trial.folder(), &args).stderr, &[says]);
+            let strict = trackfuse(trial.folder(), &[&args[..], &["--strict"]].concat());
+            assert_eq!(strict.code, 1, "{strict:#?}");
+        }
     }
 }
 

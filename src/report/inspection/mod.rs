@@ -104,7 +104,7 @@ pub struct IndexReport {
 /// Which checksums there are, and which were checked.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct ChecksumReport {
-    /// Of the summary: `right` or `none`; with a wrong one a log can't be opened.
+    /// Of the summary: `right`, `none`, or `not used` where the summary is missing, or can't be trusted.
     pub summary: String,
     /// Of the whole data section: `not checked` or `none`.
     pub data_section: String,
@@ -126,8 +126,6 @@ pub struct ClocksRead {
 /// What `fuse` would do without a config.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct FuseReport {
-    /// Whether it can add channels to the log.
-    pub can_append: bool,
     /// Why it would refuse; empty where it would run.
     pub refusals: Vec<String>,
     /// What to do about it.

@@ -130,7 +130,11 @@ fn index_state(index: &IndexReport, chunks: usize) -> String {
 /// What was checked, what was not, and what can't be.
 fn checksum_state(sums: &ChecksumReport, chunks: usize) -> String {
     let (mut right, mut unchecked, mut missing) = (Vec::new(), Vec::new(), Vec::new());
-    let summary = if sums.summary == "none" { &mut missing } else { &mut right };
+    let summary = match sums.summary.as_str() {
+        "none" => &mut missing,
+        "right" => &mut right,
+        _ => &mut unchecked,
+    };
     summary.push("summary".to_owned());
     let data = if sums.data_section == "none" { &mut missing } else { &mut unchecked };
     data.push("data section".to_owned());
