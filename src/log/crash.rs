@@ -80,6 +80,22 @@ fn in_place_gives_the_same_bytes_as_a_new_file() {
     assert_eq!(trial.names(), ["in.mcap"]);
 }
 
+#[test]
+fn an_old_end_of_several_pieces_is_kept_while_it_is_overwritten() {
+    let trial = Trial::new();
+    let out = trial.path.with_file_name("out.mcap");
+    let schema: String = (0..400_000).map(|i| format!("{i:07}")).collect();
+    let channels = [NewChannel::json("/large", "Large", &schema)];
+    let log = Log::open_in_place(&trial.path).unwrap();
+    Appender::begin(&log, &Destination::InPlace, &channels, Compression::None).unwrap().finish().unwrap();
+    drop(log);
+    add(&trial.path, "/x", &Destination::new_file(&out)).unwrap();
+    add(&trial.path, "/x", &Destination::InPlace).unwrap();
+    assert!(trial.now() == fs::read(&out).unwrap());
+    take_off(&trial.path).unwrap();
+    assert!(trial.now() == trial.original);
+}
+
 /// What a power failure leaves depends on this order.
 #[test]
 fn the_old_end_is_on_the_disk_before_the_log_changes_and_the_log_before_the_old_end_is_removed() {
