@@ -1,24 +1,33 @@
 //! `trackfuse inspect`: log -> what is in it.
 
-use super::{CommandError, Outcome, show};
+use super::{CommandError, Outcome, show, warn};
 use crate::cli::Inspect;
 use crate::config::Config;
-use crate::inspect::inspect as look_into;
+use crate::inspect::{inspect as look_into, verified};
+use crate::log::verify::verify;
 use crate::log::{Log, LogError, WholePart};
 use crate::report;
 
-/// Says what is in a log.
+/// Says what is in a log, and what is wrong with it.
 ///
 /// # Errors
 /// [`CommandError::Log`] for a log that can't be opened, [`CommandError::Broken`] where a part of it is whole.
 pub fn inspect(args: &Inspect) -> Result<Outcome, CommandError> {
-    let log = Log::open(&args.log).map_err(|error| match (&error, WholePart::of(&args.log)) {
+    let verification = args.verify.then(|| verify(&args.log, &mut |_, _| {})).transpose()?;
+    let log = Log::open(&args.log).inspect_err(|_| {
+        // What a log that can't be opened has wrong with it is not for a report of what is in it.
+        warn(args.voice, &verification.as_ref().map(verified::warnings).unwrap_or_default());
+    });
+    let log = log.map_err(|error| match (&error, WholePart::of(&args.log)) {
         (LogError::CutOff { .. } | LogError::Damaged { .. }, Some(whole)) => {
             CommandError::Broken { error, whole: Box::new(whole) }
         }
         _ => error.into(),
     })?;
-    let inspection = look_into(&log, &Config::default().output.prefix);
+    let mut inspection = look_into(&log, &Config::default().output.prefix);
+    if let Some(verification) = verification {
+        verified::add(&mut inspection, verification);
+    }
     let text = report::render_inspection(&inspection);
     show(args.voice, &text, &inspection, &inspection.warnings)?;
     Ok(if inspection.warnings.is_empty() { Outcome::Done } else { Outcome::Warned })

@@ -1,6 +1,6 @@
 //! The records of a chunk, decompressed and checked.
 
-use std::io::{BufReader, Read};
+use std::io::{BufRead, BufReader, Read};
 use std::ops::Range;
 
 use mcap::records::{ChunkHeader, ChunkIndex, op};
@@ -93,19 +93,31 @@ pub(super) fn read_block(file: &LogFile, block: &Block<'_>, buf: &mut Vec<u8>) -
     };
     let offset = chunk.chunk_start_offset;
     let (header, data) = read_header(file, offset, offset.saturating_add(chunk.chunk_length).min(file.len))?;
+    let compressed = BufReader::with_capacity(1 << 17, file.reader(data.start).take(data.end - data.start));
+    decompress(file, offset, &header, compressed, buf)?;
+    check_crc(file, offset, &header, buf)
+}
+
+/// Puts the records of the chunk at `offset` into `buf`, as many bytes as its header claims.
+pub(super) fn decompress(
+    file: &LogFile,
+    offset: u64,
+    header: &ChunkHeader,
+    compressed: impl BufRead,
+    buf: &mut Vec<u8>,
+) -> Result<(), LogError> {
     let size = header.uncompressed_size;
     if size > MEMORY_LIMIT {
         return Err(file.too_large(offset, "the chunk", size));
     }
-    let compressed = file.reader(data.start).take(data.end - data.start);
     buf.clear();
     // One byte more than claimed tells a chunk that holds more from one that is right.
     let read = match header.compression.as_str() {
         "" => compressed.take(size + 1).read_to_end(buf),
-        "zstd" => zstd::Decoder::with_buffer(BufReader::with_capacity(1 << 17, compressed))
-            .and_then(|decoder| decoder.take(size + 1).read_to_end(buf)),
-        "lz4" => lz4::Decoder::new(BufReader::with_capacity(1 << 17, compressed))
-            .and_then(|decoder| decoder.take(size + 1).read_to_end(buf)),
+        "zstd" => {
+            zstd::Decoder::with_buffer(compressed).and_then(|decoder| decoder.take(size + 1).read_to_end(buf))
+        }
+        "lz4" => lz4::Decoder::new(compressed).and_then(|decoder| decoder.take(size + 1).read_to_end(buf)),
         name => {
             let (path, name) = (file.path.clone(), name.to_owned());
             return Err(LogError::UnknownCompression { path, offset, name });
@@ -116,8 +128,21 @@ pub(super) fn read_block(file: &LogFile, block: &Block<'_>, buf: &mut Vec<u8>) -
         let relation = if buf.len() as u64 > size { "more than" } else { "less than" };
         return Err(file.damaged(offset, format!("the chunk holds {relation} the {size} bytes it claims")));
     }
-    let found = crc32fast::hash(buf);
-    if header.uncompressed_crc != 0 && header.uncompressed_crc != found {
+    Ok(())
+}
+
+/// Holds a chunk's records against its checksum, if it has one.
+pub(super) fn check_crc(
+    file: &LogFile,
+    offset: u64,
+    header: &ChunkHeader,
+    records: &[u8],
+) -> Result<(), LogError> {
+    if header.uncompressed_crc == 0 {
+        return Ok(());
+    }
+    let found = crc32fast::hash(records);
+    if header.uncompressed_crc != found {
         let what = format!("the chunk's CRC is {found:08x}, its header says {:08x}", header.uncompressed_crc);
         return Err(file.damaged(offset, what));
     }

@@ -10,7 +10,7 @@ use mcap::records::{
 use super::file::{HEAD_LEN, Head, LogFile, parse};
 use super::{LogError, Obstacle, chunk, output, survey};
 
-const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
+pub(super) const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 const MAGIC_LEN: u64 = MAGIC.len() as u64;
 /// Summary start, summary offset start, CRC.
 const FOOTER_BODY_LEN: u64 = 8 + 8 + 4;

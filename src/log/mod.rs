@@ -29,6 +29,7 @@ mod output;
 mod summary;
 mod survey;
 mod times;
+pub mod verify;
 mod whole_part;
 
 pub use addition::{Compression, NewChannel, NewMessage, NewMetadata};
