@@ -11,8 +11,7 @@ pub fn add(inspection: &mut Inspection, found: Verification) {
     inspection.warnings.extend(warnings(&found));
     let checked = found.checked;
     let sums = &mut inspection.checksums;
-    for (sum, state) in
-        [(&mut sums.summary, checked.summary), (&mut sums.data_section, checked.data_section)]
+    for (sum, state) in [(&mut sums.summary, checked.summary), (&mut sums.data_section, checked.data_section)]
     {
         if let Some(right) = state {
             *sum = if right { "right" } else { "wrong" }.into();

@@ -14,8 +14,7 @@ fn verify(log: &[u8], code: i32) -> (String, String, Value) {
     assert_eq!((text.code, json.code), (code, code), "{text:#?}");
     let report = serde_json::from_str(&json.stdout).unwrap_or_default();
     if code != 1 {
-        let schema: Value =
-            serde_json::from_str(include_str!("../../schemas/inspect.schema.json")).unwrap();
+        let schema: Value = serde_json::from_str(include_str!("../../schemas/inspect.schema.json")).unwrap();
         validate(&report, &schema, &schema, "report");
     }
     (text.stdout, text.stderr, report)
@@ -32,8 +31,16 @@ fn first_chunk(log: &[u8]) -> usize {
 
 #[test]
 fn verify_of_a_good_log_says_how_much_was_checked_and_that_nothing_is_wrong() {
-    let (text, _, report) = verify(&two_sensors().finish(), 0);
-    assert_says(&text, &["verified    ", " messages, ", " index entries: nothing is wrong\n", "checksums   right: summary, data section, "]);
+    let (text, _, report) = verify(&two_sensors(), 0);
+    assert_says(
+        &text,
+        &[
+            "verified    ",
+            " messages, ",
+            " index entries: nothing is wrong\n",
+            "checksums   right: summary, data section, ",
+        ],
+    );
     assert_eq!(report["verification"]["findings"], serde_json::json!([]));
     assert_eq!(report["verification"]["messages"], report["file"]["messages"]);
     assert_eq!(report["verification"]["bytes"], report["file"]["bytes"]);
@@ -42,7 +49,7 @@ fn verify_of_a_good_log_says_how_much_was_checked_and_that_nothing_is_wrong() {
 
 #[test]
 fn verify_names_what_is_wrong_and_where_and_the_exit_code_tells() {
-    let mut log = two_sensors().finish();
+    let mut log = two_sensors();
     let chunk = first_chunk(&log);
     log[chunk + 9 + 24] ^= 1;
     let (text, stderr, report) = verify(&log, 3);

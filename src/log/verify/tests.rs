@@ -1,5 +1,7 @@
 //! A good log is broken in one place each, and verifying must say so there.
 
+use std::fs;
+
 use super::super::fixture::{PRIVATE, chunked, log, on_disk, records};
 use super::super::summary::encode_bytes;
 use super::*;
@@ -71,19 +73,22 @@ fn good_logs_verify_without_a_finding_and_what_lacks_a_checksum_is_named_once() 
 #[test]
 fn every_flipped_byte_is_found() {
     let bytes = log(chunked());
+    let (_dir, path) = on_disk(&bytes);
     for at in 8..bytes.len() {
         let mut bytes = bytes.clone();
         bytes[at] ^= 1 << (at % 8);
-        assert!(!of(&bytes).is_clean(), "byte {at}");
+        fs::write(&path, &bytes).unwrap();
+        assert!(!verify(&path, &mut |_, _| {}).unwrap().is_clean(), "byte {at}");
     }
 }
 
 #[test]
 fn a_log_cut_off_anywhere_and_bytes_behind_its_end_are_found() {
     let bytes = log(chunked());
+    let (_dir, path) = on_disk(&bytes);
     for len in 1..bytes.len() {
-        let found = of(&bytes[..len]);
-        assert!(!found.is_clean(), "cut at {len}");
+        fs::write(&path, &bytes[..len]).unwrap();
+        assert!(!verify(&path, &mut |_, _| {}).unwrap().is_clean(), "cut at {len}");
     }
     assert_says(&[&bytes[..], b"more"].concat(), bytes.len(), "4 bytes stand behind the end");
     let footer = body_of(&bytes, op::FOOTER) - 9;
