@@ -22,8 +22,11 @@ fn with_file<T>(data: &[u8], f: impl FnOnce(&Path, &Path) -> T) -> T {
     })
 }
 
-/// Every message of the log, up to the first part that can't be read: time, and how long.
-fn messages(log: &Log) -> (Vec<(u16, u64, usize)>, Result<(), LogError>) {
+/// Channel, log time and length of a message.
+type Told = (u16, u64, usize);
+
+/// Every message of the log, up to the first part that can't be read.
+fn messages(log: &Log) -> (Vec<Told>, Result<(), LogError>) {
     let channels: BTreeSet<u16> = (0..=u16::MAX).collect();
     let mut found = Vec::new();
     let read = log.for_each_message(&channels, |message| {

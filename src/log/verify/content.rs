@@ -97,15 +97,12 @@ impl Content {
     /// Holds a copy in the summary against the data section. The answer is its id.
     pub(super) fn copy(&self, opcode: u8, offset: u64, body: &[u8], findings: &mut Findings) -> Option<u16> {
         let place = Place { offset, in_chunk: None };
-        let (what, id, digest, own) = match opcode {
-            op::SCHEMA => {
-                let (id, digest) = schema(place, body, findings)?;
-                ("schema", id, digest, self.schemas.get(&id))
-            }
-            _ => {
-                let (id, _, digest) = channel(place, body, findings)?;
-                ("channel", id, digest, self.channels.get(&id))
-            }
+        let (what, id, digest, own) = if opcode == op::SCHEMA {
+            let (id, digest) = schema(place, body, findings)?;
+            ("schema", id, digest, self.schemas.get(&id))
+        } else {
+            let (id, _, digest) = channel(place, body, findings)?;
+            ("channel", id, digest, self.channels.get(&id))
         };
         if let Some(own) = own
             && own.digest.is_some()

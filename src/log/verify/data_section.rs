@@ -18,6 +18,18 @@ use super::{Checked, attachment};
 /// Channel, sequence and two times of a message.
 const MESSAGE_HEADER_LEN: u64 = 2 + 4 + 8 + 8;
 
+/// How a data section ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum End {
+    /// With its `DataEnd`.
+    Whole,
+    /// Without, where the summary begins.
+    #[default]
+    Missing,
+    /// So damaged that where the summary begins is not known.
+    Lost,
+}
+
 /// What was found in a data section. Indexes are as they should be, by offset.
 #[derive(Debug, Default)]
 pub(super) struct DataSection {
@@ -30,10 +42,7 @@ pub(super) struct DataSection {
     pub(super) has_holes: bool,
     /// Whether a chunk or a part of it can't be read.
     pub(super) has_unreadable: bool,
-    /// Whether it ended with its `DataEnd`.
-    pub(super) has_end: bool,
-    /// Whether so much is damaged that where the summary begins is not known.
-    pub(super) is_lost: bool,
+    pub(super) end: End,
     pub(super) findings: Findings,
     pub(super) not_checkable: Vec<String>,
     pub(super) checked: Checked,
@@ -56,7 +65,7 @@ impl DataSection {
             }
             if sequence.left() == 0 {
                 data.findings.wrong(offset, "the file ends within its data section: it was cut off");
-                data.is_lost = true;
+                data.end = End::Lost;
                 break;
             }
             let head = match sequence.head()? {
@@ -92,7 +101,7 @@ impl DataSection {
                 continue;
             }
             if data.record(sequence, head, &mut body, &mut chunk)? {
-                data.has_end = true;
+                data.end = End::Whole;
                 break;
             }
         }
@@ -245,7 +254,7 @@ impl DataSection {
             sequence.jump(next)?;
             return Ok(true);
         }
-        self.is_lost = true;
+        self.end = End::Lost;
         let left = sequence.file.len - offset;
         self.findings.wrong(
             offset,

@@ -8,7 +8,7 @@ use super::super::LogError;
 use super::super::file::{HEAD_LEN, Head, LogFile, MEMORY_LIMIT, parse};
 use super::super::index::MAGIC;
 use super::against::Summary;
-use super::data_section::DataSection;
+use super::data_section::{DataSection, End};
 use super::sequence::{Sequence, name_of};
 
 /// Two starts and a checksum.
@@ -127,13 +127,13 @@ pub(super) fn check(
     ending: Option<&Ending>,
     data: &mut DataSection,
 ) -> Result<(), LogError> {
-    if data.is_lost {
+    if data.end == End::Lost {
         data.not_checkable.push("the summary, which was not found".into());
         return Ok(());
     }
     if let Some(ending) = ending
         && sequence.position > ending.tail_start
-        && !data.has_end
+        && data.end == End::Missing
     {
         sequence.jump(ending.tail_start)?;
     }
