@@ -127,6 +127,7 @@ impl DataSection {
         let place = Place { offset: head.offset, in_chunk: None };
         match head.opcode {
             op::MESSAGE => {
+                self.checked.loose_messages += 1;
                 sequence.read_into(head.body_len.min(MESSAGE_HEADER_LEN), body)?;
                 let _: Option<MessageHeader> = self.content.message(place, body, &mut self.findings);
                 sequence.pass(head.end() - sequence.position, |_| {})?;

@@ -49,6 +49,8 @@ pub struct Checked {
     pub chunks_without_message_index: u64,
     /// Messages, in chunks and outside.
     pub messages: u64,
+    /// Messages outside chunks.
+    pub loose_messages: u64,
     /// Entries of message indexes.
     pub index_entries: u64,
     /// Attachments.
@@ -121,6 +123,7 @@ fn not_checkable(data: &DataSection) -> Vec<String> {
     let counts = [
         (checked.chunks_without_checksum, checked.chunks, "chunks", "checksum"),
         (checked.chunks_without_message_index, checked.chunks, "chunks", "message index"),
+        (checked.loose_messages, checked.messages, "messages stand outside chunks and", "index"),
         (checked.attachments_without_checksum, checked.attachments, "attachments", "checksum"),
     ];
     for (n, of, what, lack) in counts.into_iter().filter(|(n, ..)| *n > 0) {

@@ -68,6 +68,7 @@ fn good_logs_verify_without_a_finding_and_what_lacks_a_checksum_is_named_once() 
     let found = of(&log(chunked().use_chunks(false)));
     assert!(found.is_clean(), "{found:#?}");
     assert_eq!(found.checked.messages, 20);
+    assert_eq!(found.not_checkable, ["20 of 20 messages stand outside chunks and have no index"]);
 }
 
 #[test]
