@@ -41,7 +41,7 @@ pub enum Command {
     Simulate(Simulate),
     /// Show what is in a log: channels, rates, gaps, clocks, sources, and what is wrong with it
     ///
-    /// Of a large log no more is read than that takes: some seconds for 50 GB.
+    /// Of a large log no more is read than that takes: some seconds for 50 GB. With `--verify` all of it is.
     Inspect(Inspect),
     /// Write a commented config for a log: its sources, and every other key with its default
     Init(Init),
@@ -226,6 +226,9 @@ pub enum Format {
 pub struct Inspect {
     /// The log to look into
     pub log: PathBuf,
+    /// Read all of the log, and check every checksum and index entry of it
+    #[arg(long)]
+    pub verify: bool,
     /// How to talk.
     #[command(flatten)]
     pub voice: Voice,

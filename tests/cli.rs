@@ -23,5 +23,6 @@ mod cli {
     mod sources;
     mod trial;
     mod trial_log;
+    mod verify;
     mod viewer_topics;
 }

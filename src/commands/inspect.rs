@@ -1,19 +1,27 @@
 //! `trackfuse inspect`: log -> what is in it.
 
-use super::{CommandError, Outcome, show};
+use super::{CommandError, Outcome, show, warn};
 use crate::cli::Inspect;
 use crate::config::Config;
-use crate::inspect::inspect as look_into;
+use crate::inspect::{inspect as look_into, verified};
 use crate::log::Log;
+use crate::log::verify::verify;
 use crate::report;
 
-/// Says what is in a log.
+/// Says what is in a log, and what is wrong with it.
 ///
 /// # Errors
 /// [`CommandError::Log`] for a log that can't be opened.
 pub fn inspect(args: &Inspect) -> Result<Outcome, CommandError> {
-    let log = Log::open(&args.log)?;
-    let inspection = look_into(&log, &Config::default().output.prefix);
+    let verification = args.verify.then(|| verify(&args.log, &mut |_, _| {})).transpose()?;
+    let log = Log::open(&args.log).inspect_err(|_| {
+        // What a log that can't be opened has wrong with it is not for a report of what is in it.
+        warn(args.voice, &verification.as_ref().map(verified::warnings).unwrap_or_default());
+    })?;
+    let mut inspection = look_into(&log, &Config::default().output.prefix);
+    if let Some(verification) = verification {
+        verified::add(&mut inspection, verification);
+    }
     let text = report::render_inspection(&inspection);
     show(args.voice, &text, &inspection, &inspection.warnings)?;
     Ok(if inspection.warnings.is_empty() { Outcome::Done } else { Outcome::Warned })

@@ -10,6 +10,7 @@
 mod channels;
 mod noticed;
 mod rhythm;
+pub mod verified;
 
 use std::collections::BTreeMap;
 
@@ -47,6 +48,7 @@ pub fn inspect(log: &Log, prefix: &str) -> Inspection {
         file: file(index, extent),
         index: index_state(index, &times),
         checksums: checksums(index, &times, &excerpt),
+        verification: None,
         earlier_results: earlier_results(&judgement),
         fuse: fuse(log, recognised.as_ref(), prefix),
         clocks_read: ClocksRead { parts: excerpt.read, of: excerpt.parts },

@@ -1,6 +1,6 @@
 //! The records of a chunk, decompressed and checked.
 
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufRead, BufReader, Read};
 use std::ops::Range;
 
 use mcap::records::{ChunkHeader, ChunkIndex, op};
@@ -126,25 +126,40 @@ pub(super) fn read_block(file: &LogFile, block: &Block<'_>, buf: &mut Vec<u8>) -
     };
     let offset = chunk.chunk_start_offset;
     let (header, data) = read_header(file, offset, offset.saturating_add(chunk.chunk_length).min(file.len))?;
+    let compressed = BufReader::with_capacity(1 << 17, file.reader(data.start).take(data.end - data.start));
+    decompress(file, offset, &header, compressed, buf)?;
+    check_crc(file, offset, &header, buf)
+}
+
+/// Puts the records of the chunk at `offset` into `buf`, as many bytes as its header claims.
+pub(super) fn decompress(
+    file: &LogFile,
+    offset: u64,
+    header: &ChunkHeader,
+    compressed: impl BufRead,
+    buf: &mut Vec<u8>,
+) -> Result<(), LogError> {
     let size = header.uncompressed_size;
     if size > file.memory_limit {
         return Err(file.too_large(offset, "the chunk", size));
     }
     // One byte more than claimed tells a chunk that holds more from one that is right.
-    decompress(file, offset, &header, data, size + 1, buf)?
+    stream(file, offset, header, compressed, size + 1, buf)?
         .map_err(|e| file.damaged(offset, format!("the chunk can't be decompressed: {e}")))?;
     if buf.len() as u64 != size {
         let relation = if buf.len() as u64 > size { "more than" } else { "less than" };
         return Err(file.damaged(offset, format!("the chunk holds {relation} the {size} bytes it claims")));
     }
-    check_crc(file, offset, &header, buf)
+    Ok(())
 }
 
 /// What can be decompressed of a chunk that is cut off, up to its last whole record.
 fn read_cut(file: &LogFile, cut: &CutChunk, buf: &mut Vec<u8>) -> Result<(), LogError> {
     let size = cut.header.uncompressed_size;
+    let compressed = file.reader(cut.data.start).take(cut.data.end - cut.data.start);
+    let compressed = BufReader::with_capacity(1 << 17, compressed);
     // That it ends too early is no news.
-    let _ = decompress(file, cut.offset, &cut.header, cut.data.clone(), size.min(file.memory_limit), buf)?;
+    let _ = stream(file, cut.offset, &cut.header, compressed, size.min(file.memory_limit), buf)?;
     if buf.len() as u64 == size {
         check_crc(file, cut.offset, &cut.header, buf)?;
     }
@@ -154,22 +169,21 @@ fn read_cut(file: &LogFile, cut: &CutChunk, buf: &mut Vec<u8>) -> Result<(), Log
 }
 
 /// Puts at most `most` decompressed bytes into `buf`: all that there are before the error, if there is one.
-fn decompress(
+fn stream(
     file: &LogFile,
     offset: u64,
     header: &ChunkHeader,
-    data: Range<u64>,
+    compressed: impl BufRead,
     most: u64,
     buf: &mut Vec<u8>,
 ) -> Result<io::Result<usize>, LogError> {
-    let compressed = file.reader(data.start).take(data.end - data.start);
     buf.clear();
     Ok(match header.compression.as_str() {
         "" => compressed.take(most).read_to_end(buf),
-        "zstd" => zstd::Decoder::with_buffer(BufReader::with_capacity(1 << 17, compressed))
-            .and_then(|decoder| decoder.take(most).read_to_end(buf)),
-        "lz4" => lz4::Decoder::new(BufReader::with_capacity(1 << 17, compressed))
-            .and_then(|decoder| decoder.take(most).read_to_end(buf)),
+        "zstd" => {
+            zstd::Decoder::with_buffer(compressed).and_then(|decoder| decoder.take(most).read_to_end(buf))
+        }
+        "lz4" => lz4::Decoder::new(compressed).and_then(|decoder| decoder.take(most).read_to_end(buf)),
         name => {
             let (path, name) = (file.path.clone(), name.to_owned());
             return Err(LogError::UnknownCompression { path, offset, name });
@@ -177,9 +191,18 @@ fn decompress(
     })
 }
 
-fn check_crc(file: &LogFile, offset: u64, header: &ChunkHeader, content: &[u8]) -> Result<(), LogError> {
-    let found = crc32fast::hash(content);
-    if header.uncompressed_crc != 0 && header.uncompressed_crc != found {
+/// Holds a chunk's records against its checksum, if it has one.
+pub(super) fn check_crc(
+    file: &LogFile,
+    offset: u64,
+    header: &ChunkHeader,
+    records: &[u8],
+) -> Result<(), LogError> {
+    if header.uncompressed_crc == 0 {
+        return Ok(());
+    }
+    let found = crc32fast::hash(records);
+    if header.uncompressed_crc != found {
         let what = format!("the chunk's CRC is {found:08x}, its header says {:08x}", header.uncompressed_crc);
         return Err(file.damaged(offset, what));
     }

@@ -56,6 +56,7 @@ mod summary;
 mod survey;
 mod times;
 mod undo;
+pub mod verify;
 mod visibility;
 
 pub use addition::{Compression, NewChannel, NewMessage, NewMetadata};

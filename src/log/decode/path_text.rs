@@ -52,8 +52,10 @@ struct Parser<'t> {
 
 impl Parser<'_> {
     fn next(&mut self) -> Option<char> {
-        self.at += 1;
-        self.rest.next()
+        let next = self.rest.next();
+        // the end has a place of its own, but nothing behind it
+        self.at += usize::from(next.is_some());
+        next
     }
 
     fn eat(&mut self, c: char) -> bool {
@@ -342,6 +344,7 @@ mod tests {
         assert!(error("/a{b==nan}").contains("found 'n' at character 7, expected a number"));
         assert!(error("/a{b==1e999}").contains("expected a number"));
         assert!(error("/a{b=='x}").contains("found the end at character 10, expected a closing quote"));
+        assert!(error(r#""te\"#).contains("found the end at character 5, expected a closing quote"));
     }
 
     fn filters() -> impl Strategy<Value = Filter> {

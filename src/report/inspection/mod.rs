@@ -21,6 +21,8 @@ pub struct Inspection {
     pub index: IndexReport,
     /// The state of its checksums.
     pub checksums: ChecksumReport,
+    /// What `--verify` found; null without it.
+    pub verification: Option<VerificationReport>,
     /// Topics that this program wrote in earlier runs.
     pub earlier_results: Vec<String>,
     /// What `fuse` would take without a config, and what it would say.
@@ -104,14 +106,46 @@ pub struct IndexReport {
 /// Which checksums there are, and which were checked.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct ChecksumReport {
-    /// Of the summary: `right`, `none`, or `not used` where the summary is missing, or can't be trusted.
+    /// Of the summary: `right`, `wrong`, `none`, or `not used` where the summary is missing, or can't be trusted.
     pub summary: String,
-    /// Of the whole data section: `not checked` or `none`.
+    /// Of the whole data section: `not checked` or `none`; with `--verify` also `right` or `wrong`.
     pub data_section: String,
     /// Chunks that have none.
     pub chunks_without: usize,
     /// Chunks whose checksum was found to be right.
     pub chunks_right: usize,
+}
+
+/// Every checksum and index entry of the file, held against what the file holds.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct VerificationReport {
+    /// What is wrong, mostly in file order; the first hundred.
+    pub findings: Vec<FindingReport>,
+    /// How much more is.
+    pub findings_left_out: u64,
+    /// What the file has no checksum or index for, or what damage hides.
+    pub not_checkable: Vec<String>,
+    /// Bytes that were read.
+    pub bytes: u64,
+    /// Chunks that were read.
+    pub chunks: u64,
+    /// Messages, in chunks and outside.
+    pub messages: u64,
+    /// Entries of message indexes.
+    pub index_entries: u64,
+    /// Attachments.
+    pub attachments: u64,
+    /// Metadata records.
+    pub metadata_records: u64,
+}
+
+/// Something that is wrong with the file.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct FindingReport {
+    /// Where the record begins that it is about, bytes from the start of the file.
+    pub offset: u64,
+    /// What was found, and what was expected.
+    pub what: String,
 }
 
 /// How much was read to look at clocks.

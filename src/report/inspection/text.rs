@@ -3,7 +3,7 @@
 use std::fmt::{self, Write};
 
 use super::super::amount::{bytes, clock_time, counted};
-use super::{ChecksumReport, FileReport, FuseReport, IndexReport, Inspection, table};
+use super::{ChecksumReport, FileReport, FuseReport, IndexReport, Inspection, VerificationReport, table};
 use crate::printable::printable;
 use crate::time::Time;
 
@@ -28,7 +28,11 @@ fn write_page(out: &mut String, inspection: &Inspection) -> fmt::Result {
     writeln!(out, "recorded    {}", recorded(file))?;
     writeln!(out, "content     {}", content(file, inspection.channels.len()))?;
     writeln!(out, "index       {}", index_state(index, file.chunks))?;
-    writeln!(out, "checksums   {}", checksum_state(checksums, file.chunks))?;
+    let verification = inspection.verification.as_ref();
+    writeln!(out, "checksums   {}", checksum_state(checksums, file.chunks, verification.is_some()))?;
+    if let Some(verification) = verification {
+        writeln!(out, "verified    {}", printable(&verified(verification)))?;
+    }
     if !inspection.earlier_results.is_empty() {
         writeln!(out, "results     {}", printable(&inspection.earlier_results.join(", ")))?;
     }
@@ -127,17 +131,17 @@ fn index_state(index: &IndexReport, chunks: usize) -> String {
     if state.is_empty() { "complete".into() } else { state.join("; ") }
 }
 
-/// What was checked, what was not, and what can't be.
-fn checksum_state(sums: &ChecksumReport, chunks: usize) -> String {
+/// What was checked, what was not, and what can't be. After all was checked, what is not right is wrong.
+fn checksum_state(sums: &ChecksumReport, chunks: usize, verified: bool) -> String {
     let (mut right, mut unchecked, mut missing) = (Vec::new(), Vec::new(), Vec::new());
-    let summary = match sums.summary.as_str() {
-        "none" => &mut missing,
-        "right" => &mut right,
-        _ => &mut unchecked,
-    };
-    summary.push("summary".to_owned());
-    let data = if sums.data_section == "none" { &mut missing } else { &mut unchecked };
-    data.push("data section".to_owned());
+    for (what, state) in [("summary", &sums.summary), ("data section", &sums.data_section)] {
+        let list = match state.as_str() {
+            "right" => &mut right,
+            "none" => &mut missing,
+            _ => &mut unchecked,
+        };
+        list.push(what.to_owned());
+    }
     let with = chunks.saturating_sub(sums.chunks_without);
     let unread = with.saturating_sub(sums.chunks_right);
     let counts = [(&mut right, sums.chunks_right), (&mut unchecked, unread), (&mut missing, chunks - with)];
@@ -146,9 +150,42 @@ fn checksum_state(sums: &ChecksumReport, chunks: usize) -> String {
             list.push(if n == chunks { "all chunks".to_owned() } else { counted(n, "chunk") });
         }
     }
-    let parts = [("right", right), ("not checked", unchecked), ("none", missing)];
+    let parts = [
+        ("right", right),
+        (if verified { "not right" } else { "not checked" }, unchecked),
+        ("none", missing),
+    ];
     let parts = parts.iter().filter(|(_, list)| !list.is_empty());
     parts.map(|(what, list)| format!("{what}: {}", list.join(", "))).collect::<Vec<_>>().join("; ")
+}
+
+/// How much was held against each other, and how that ended.
+fn verified(verification: &VerificationReport) -> String {
+    let counts = [
+        (verification.chunks, "chunk"),
+        (verification.messages, "message"),
+        (verification.attachments, "attachment"),
+        (verification.metadata_records, "metadata record"),
+    ];
+    let counts = counts.iter().filter(|(n, _)| *n > 0).map(|(n, what)| counted(*n as usize, what));
+    let mut parts: Vec<String> = std::iter::once(bytes(verification.bytes)).chain(counts).collect();
+    match verification.index_entries {
+        0 => {}
+        1 => parts.push("1 index entry".into()),
+        n => parts.push(format!("{n} index entries")),
+    }
+    let wrong = verification.findings.len() as u64 + verification.findings_left_out;
+    let verdict = match wrong {
+        0 => "nothing is wrong".into(),
+        1 => "1 thing is wrong".into(),
+        n => format!("{n} things are wrong"),
+    };
+    let mut text = format!("{}: {verdict}", parts.join(", "));
+    if !verification.not_checkable.is_empty() {
+        text += "; not checkable: ";
+        text += &verification.not_checkable.join(", ");
+    }
+    text
 }
 
 /// What `fuse` would do, the first thing that one wants to know.
