@@ -53,6 +53,24 @@ pub struct Voice {
     pub quiet: bool,
 }
 
+/// What a log may take.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct Memory {
+    /// What one chunk or record of the log may take in memory
+    #[arg(long, value_name = "SIZE", default_value = "1GiB", value_parser = bytes)]
+    pub memory_limit: u64,
+}
+
+/// Such as `512MB` or `2GiB`.
+fn bytes(text: &str) -> Result<u64, String> {
+    let units = [("GiB", 1 << 30), ("MiB", 1 << 20), ("GB", 1_000_000_000), ("MB", 1_000_000), ("B", 1)];
+    let (number, unit) =
+        units.iter().find_map(|&(name, unit)| Some((text.strip_suffix(name)?, unit))).unwrap_or((text, 1));
+    let number: Option<u64> = number.trim().parse().ok();
+    let bytes = number.and_then(|n| n.checked_mul(unit)).filter(|bytes| (1..=1 << 40).contains(bytes));
+    bytes.ok_or_else(|| format!("expected a size up to 1024GiB, such as 512MB or 4GiB, got {text:?}"))
+}
+
 /// Arguments of `fuse`.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
@@ -76,6 +94,12 @@ pub struct Fuse {
     /// Prefix of the new topics [default: the config's, else /fused]
     #[arg(long)]
     pub prefix: Option<String>,
+    /// Read every chunk with sources whole and check its checksum, also uncompressed ones of which less would do
+    #[arg(long)]
+    pub check_chunks: bool,
+    /// What the log may take.
+    #[command(flatten)]
+    pub memory: Memory,
     /// How to talk.
     #[command(flatten)]
     pub voice: Voice,
@@ -121,6 +145,9 @@ pub struct Compare {
     /// A further height to compare at, such as exit=-2, in metres, Z up [default: those on the events topic]
     #[arg(long, value_name = "NAME=Z", value_parser = height, allow_hyphen_values = true)]
     pub height: Vec<Height>,
+    /// What the log may take.
+    #[command(flatten)]
+    pub memory: Memory,
     /// How to talk.
     #[command(flatten)]
     pub voice: Voice,
@@ -156,6 +183,9 @@ pub struct Export {
     /// Replace an existing output
     #[arg(long)]
     pub force: bool,
+    /// What the log may take.
+    #[command(flatten)]
+    pub memory: Memory,
     /// How to talk.
     #[command(flatten)]
     pub voice: Voice,
@@ -176,6 +206,9 @@ pub enum Format {
 pub struct Inspect {
     /// The log to look into
     pub log: PathBuf,
+    /// What the log may take.
+    #[command(flatten)]
+    pub memory: Memory,
     /// How to talk.
     #[command(flatten)]
     pub voice: Voice,
@@ -197,6 +230,9 @@ pub struct Init {
     /// Replace an existing output
     #[arg(long)]
     pub force: bool,
+    /// What the log may take.
+    #[command(flatten)]
+    pub memory: Memory,
     /// How to talk.
     #[command(flatten)]
     pub voice: Voice,

@@ -2,9 +2,10 @@
 
 use std::io::{self, BufWriter, Write};
 
-use super::{CommandError, Outcome, say, show};
+use super::progress::Bar;
+use super::{CommandError, Outcome, open, say, show};
 use crate::cli::{Export, Format};
-use crate::log::{Log, LogError, write_new};
+use crate::log::{LogError, write_new};
 use crate::printable::printable;
 use crate::report::{ExportReport, csv};
 use crate::source;
@@ -16,11 +17,13 @@ use crate::source;
 /// written.
 pub fn export(args: &Export) -> Result<Outcome, CommandError> {
     let Format::Csv = args.format;
-    let log = Log::open(&args.log)?;
+    let bar = Bar::new(args.voice);
+    let log = open(&args.log, args.memory, &bar)?;
     if let Some(out) = &args.output {
         log.ensure_other(out)?;
     }
     let recorded = source::recorded(&log, &args.topic)?;
+    drop(bar);
     let t0 = recorded.origin();
     let warnings = &recorded.warnings;
     let mut report = ExportReport::new(args.log.display().to_string(), &args.topic, &recorded);

@@ -4,16 +4,17 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
+use super::progress::Bar;
 use super::{CommandError, Outcome, say};
 use crate::cli::Fuse;
 use crate::config::Config;
 use crate::fusion::{self, Fusion};
-use crate::log::{Appender, Log, NewMetadata};
+use crate::log::{Appender, Log, NewMetadata, ReadOptions};
 use crate::publish::{Context, Topic, messages};
 use crate::report::{self, Report};
 use crate::resolve;
 use crate::sample::Source;
-use crate::source::{self, Candidate};
+use crate::source::{self, Candidate, Samples};
 use crate::time::Time;
 use crate::track::TrackPoint;
 
@@ -27,19 +28,29 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         config.output.prefix.clone_from(prefix);
         config.check()?;
     }
-    let log = Log::open(&args.log)?;
+    let bar = Bar::new(args.voice);
+    let options = ReadOptions {
+        memory_limit: args.memory.memory_limit,
+        whole_chunks: args.check_chunks,
+        observer: bar.observer(),
+    };
+    let log = Log::open_with(&args.log, options)?;
     let output = args.output.clone().unwrap_or_else(|| beside(&args.log));
     let channels = Topic::ALL.map(|topic| topic.channel(&config.output.prefix));
     Appender::check(&log, &output, args.force, &channels)?;
 
     let named = !config.source.is_empty();
     let (unused, mut warnings) = choose_sources(&log, &mut config)?;
-    let (loaded, origin, left_out) = source::load(&log, &config.source, named)?;
+    let Samples { mut loaded, origin, left_out, read } = source::load(&log, &config.source, named)?;
+    let known = |sentence: &String| warnings.contains(sentence);
+    let left_out: Vec<String> = left_out.into_iter().filter(|sentence| !known(sentence)).collect();
     warnings.extend(left_out);
     config.source = loaded.iter().map(|l| l.config.clone()).collect();
     let datum = source::datum(&config.source);
     config.source[datum].datum = true;
-    let sources: Vec<Source> = loaded.iter().map(|l| l.source.clone()).collect();
+    // moved: copies would double what millions of samples take
+    let sources: Vec<Source> = loaded.iter_mut().map(|l| std::mem::take(&mut l.source)).collect();
+    bar.doing("fitting");
     let plan = resolve::plan(&mut config, &loaded, &sources, datum, origin, &mut warnings)?;
     let fusion = fusion::fuse(&sources, &plan)?;
     check_finite(&fusion)?;
@@ -58,6 +69,8 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         output: &output_name,
         t0,
         loaded: &loaded,
+        sources: &sources,
+        unchecked_chunks: read.unchecked,
         datum,
         unused: &unused,
         plan: &plan,
@@ -75,6 +88,7 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         log_start: resolve::log_start(&log, shift_s),
     };
     let mut appender = Appender::begin(&log, &output, args.force, &channels, config.output.compression)?;
+    bar.doing("writing the track");
     for message in messages(&fusion, context, &text, &warnings) {
         appender.write(crate::log::NewMessage {
             channel: message.topic as usize,
@@ -84,6 +98,7 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     }
     appender.write_metadata(&metadata(&log, &config, &report)?)?;
     appender.finish()?;
+    drop(bar);
     let text = format!("{input_name} -> {output_name}\n\n{text}");
     say(args.voice, &text, &report, &warnings);
     Ok(if warnings.is_empty() { Outcome::Done } else { Outcome::Warned })

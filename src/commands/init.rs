@@ -3,10 +3,11 @@
 use std::io::Write;
 use std::path::Path;
 
-use super::{CommandError, Outcome, show};
+use super::progress::Bar;
+use super::{CommandError, Outcome, open, show};
 use crate::cli::Init;
 use crate::config::{Config, SourceTable, template};
-use crate::log::{Log, LogError, write_new};
+use crate::log::{LogError, write_new};
 use crate::printable::{printable, shell_word};
 use crate::report::InitReport;
 use crate::report::inspection::TakenSource;
@@ -17,11 +18,13 @@ use crate::source;
 /// # Errors
 /// [`CommandError`] for a log that can't be read and an output that can't be written; then nothing is.
 pub fn init(args: &Init) -> Result<Outcome, CommandError> {
-    let log = Log::open(&args.log)?;
+    let bar = Bar::new(args.voice);
+    let log = open(&args.log, args.memory, &bar)?;
     if let Some(output) = &args.output {
         log.ensure_other(output)?;
     }
     let proposal = source::propose(&log, &Config::default().output.prefix)?;
+    drop(bar);
     let warnings = proposal.all_warnings();
     let input = args.log.display().to_string();
     let config = template(&head(&input, args.output.as_deref(), &warnings), &proposal.tables);

@@ -5,6 +5,7 @@ mod export;
 mod fuse;
 mod init;
 mod inspect;
+mod progress;
 mod simulate;
 
 pub use compare::compare;
@@ -15,17 +16,19 @@ pub use inspect::inspect;
 pub use simulate::simulate;
 
 use std::io::{self, IsTerminal, Write};
+use std::path::Path;
 use std::process::ExitCode;
 
-use crate::cli::Voice;
+use crate::cli::{Memory, Voice};
 use crate::config::ConfigError;
 use crate::estimate::EstimateError;
-use crate::log::{LogError, WholePart};
+use crate::log::{Log, LogError, ReadOptions, WholePart};
 use crate::printable::printable;
 use crate::resolve::ResolveError;
 use crate::simulate::SimulateError;
 use crate::source::SourceError;
 use crate::time::Time;
+use progress::Bar;
 
 /// How a command ended that did what it should.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -153,6 +156,12 @@ impl From<Outcome> for ExitCode {
             Outcome::Warned => Self::from(3),
         }
     }
+}
+
+/// Opens a command's log. `bar` shows how long work on it gets on.
+fn open(path: &Path, memory: Memory, bar: &Bar) -> Result<Log, LogError> {
+    let (memory_limit, observer) = (memory.memory_limit, bar.observer());
+    Log::open_with(path, ReadOptions { memory_limit, observer, ..ReadOptions::default() })
 }
 
 /// Prints why a command wrote nothing, and what to do about it, on stderr.

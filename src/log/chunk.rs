@@ -1,11 +1,11 @@
 //! The records of a chunk, decompressed and checked.
 
-use std::io::{BufReader, Read};
+use std::io::{self, Read};
 use std::ops::Range;
 
 use mcap::records::{ChunkHeader, ChunkIndex, op};
 
-use super::file::{HEAD_LEN, LogFile, MEMORY_LIMIT, split_head};
+use super::file::{HEAD_LEN, LogFile, split_head};
 use super::{Index, LogError};
 
 /// Start, end, size, CRC, the name's length and the compressed size: a chunk's header without the name.
@@ -33,6 +33,14 @@ impl Block<'_> {
     pub(super) fn size(&self) -> u64 {
         match self {
             Self::Chunk(chunk) => chunk.uncompressed_size,
+            Self::Loose(range) => range.end - range.start,
+        }
+    }
+
+    /// How many bytes it takes in the file.
+    pub(super) fn stored_size(&self) -> u64 {
+        match self {
+            Self::Chunk(chunk) => chunk.chunk_length,
             Self::Loose(range) => range.end - range.start,
         }
     }
@@ -83,35 +91,74 @@ pub(super) fn read_header(
     }
 }
 
+/// What decoding takes beside the result; it serves one chunk after the other.
+#[derive(Default)]
+pub(super) struct Scratch {
+    compressed: Vec<u8>,
+    zstd: Option<zstd::bulk::Decompressor<'static>>,
+}
+
+/// Above this a chunk's own header is believed only where the index says the same: how many chunks may be in memory
+/// at once is decided by the index.
+const UNANNOUNCED: u64 = 8 << 20;
+/// Memory that is kept for the next chunk, bytes.
+const KEPT: usize = 16 << 20;
+
 /// Puts the records of `block` into `buf`. A chunk's size and checksum are checked.
-pub(super) fn read_block(file: &LogFile, block: &Block<'_>, buf: &mut Vec<u8>) -> Result<(), LogError> {
-    let chunk = match block {
-        Block::Loose(range) => {
-            return file.read_into(range.start, range.end - range.start, "a run of records", buf);
-        }
-        Block::Chunk(chunk) => chunk,
-    };
+///
+/// # Errors
+/// [`LogError::BadChunk`] for a chunk that can't be decoded; [`LogError::TooLarge`];
+/// [`LogError::UnknownCompression`]; [`LogError::Read`].
+pub(super) fn read_block(
+    file: &LogFile,
+    block: &Block<'_>,
+    scratch: &mut Scratch,
+    buf: &mut Vec<u8>,
+) -> Result<(), LogError> {
+    match block {
+        Block::Loose(range) => file.read_into(range.start, range.end - range.start, "a run of records", buf),
+        Block::Chunk(chunk) => read_chunk(file, chunk, scratch, buf).map_err(LogError::of_chunk),
+    }
+}
+
+fn read_chunk(
+    file: &LogFile,
+    chunk: &ChunkIndex,
+    scratch: &mut Scratch,
+    buf: &mut Vec<u8>,
+) -> Result<(), LogError> {
     let offset = chunk.chunk_start_offset;
     let (header, data) = read_header(file, offset, offset.saturating_add(chunk.chunk_length).min(file.len))?;
-    let size = header.uncompressed_size;
-    if size > MEMORY_LIMIT {
+    let (size, len) = (header.uncompressed_size, data.end - data.start);
+    if size > file.options.memory_limit {
         return Err(file.too_large(offset, "the chunk", size));
     }
-    let compressed = file.reader(data.start).take(data.end - data.start);
-    buf.clear();
-    // One byte more than claimed tells a chunk that holds more from one that is right.
-    let read = match header.compression.as_str() {
-        "" => compressed.take(size + 1).read_to_end(buf),
-        "zstd" => zstd::Decoder::with_buffer(BufReader::with_capacity(1 << 17, compressed))
-            .and_then(|decoder| decoder.take(size + 1).read_to_end(buf)),
-        "lz4" => lz4::Decoder::new(BufReader::with_capacity(1 << 17, compressed))
-            .and_then(|decoder| decoder.take(size + 1).read_to_end(buf)),
+    if size > chunk.uncompressed_size.max(UNANNOUNCED) || len > chunk.compressed_size.max(UNANNOUNCED) {
+        let said = (chunk.compressed_size, chunk.uncompressed_size);
+        let what =
+            format!("the chunk claims {len} bytes, {size} uncompressed, its index {} and {}", said.0, said.1);
+        return Err(file.damaged(offset, what));
+    }
+    let compressed = &mut scratch.compressed;
+    let done = match header.compression.as_str() {
+        // One byte more than claimed tells a chunk that holds more from one that is right.
+        "" => file.read_into(data.start, len.min(size + 1), "a chunk", buf).map(|()| Ok(())),
+        "zstd" => file
+            .read_into(data.start, len, "a chunk", compressed)
+            .map(|()| unpack_zstd(&mut scratch.zstd, compressed, size, buf)),
+        "lz4" => file.read_into(data.start, len, "a chunk", compressed).map(|()| {
+            buf.clear();
+            lz4::Decoder::new(&compressed[..]).and_then(|d| d.take(size + 1).read_to_end(buf)).map(drop)
+        }),
         name => {
             let (path, name) = (file.path.clone(), name.to_owned());
             return Err(LogError::UnknownCompression { path, offset, name });
         }
-    };
-    read.map_err(|e| file.damaged(offset, format!("the chunk can't be decompressed: {e}")))?;
+    }?;
+    if compressed.capacity() > KEPT {
+        *compressed = Vec::new();
+    }
+    done.map_err(|e| file.damaged(offset, format!("the chunk can't be decompressed: {e}")))?;
     if buf.len() as u64 != size {
         let relation = if buf.len() as u64 > size { "more than" } else { "less than" };
         return Err(file.damaged(offset, format!("the chunk holds {relation} the {size} bytes it claims")));
@@ -122,6 +169,31 @@ pub(super) fn read_block(file: &LogFile, block: &Block<'_>, buf: &mut Vec<u8>) -
         return Err(file.damaged(offset, what));
     }
     Ok(())
+}
+
+/// Puts up to `size` bytes, or more where there are more, into `buf`: at once, which is faster than a stream.
+fn unpack_zstd(
+    decompressor: &mut Option<zstd::bulk::Decompressor<'static>>,
+    compressed: &[u8],
+    size: u64,
+    buf: &mut Vec<u8>,
+) -> io::Result<()> {
+    let decompressor = match decompressor {
+        Some(decompressor) => decompressor,
+        None => decompressor.insert(zstd::bulk::Decompressor::new()?),
+    };
+    buf.clear();
+    // Memory that is taken, but not touched, where the chunk claims more than it holds.
+    buf.try_reserve_exact(size as usize + 1).map_err(io::Error::other)?;
+    let Err(error) = decompressor.decompress_to_buffer(compressed, buf) else { return Ok(()) };
+    // Whether it is bad, or holds more than it claims, a stream tells.
+    buf.clear();
+    let mut stream = zstd::Decoder::with_buffer(compressed)?.take(size + 1);
+    if io::copy(&mut stream, &mut io::sink())? > size {
+        buf.resize(size as usize + 1, 0);
+        return Ok(());
+    }
+    Err(error)
 }
 
 /// One record of a block, whole and without its head.
@@ -156,9 +228,9 @@ pub(super) fn for_each_record<'b, E: From<LogError>>(
     blocks: impl IntoIterator<Item = Block<'b>>,
     mut f: impl FnMut(&Block<'b>, Record<'_>) -> Result<(), E>,
 ) -> Result<(), E> {
-    let mut buf = Vec::new();
+    let (mut buf, mut scratch) = (Vec::new(), Scratch::default());
     for block in blocks {
-        read_block(file, &block, &mut buf)?;
+        read_block(file, &block, &mut scratch, &mut buf)?;
         for record in records(&buf) {
             let record = record.map_err(|left| {
                 file.damaged(block.offset(), format!("the last {left} bytes of the chunk are no record"))

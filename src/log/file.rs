@@ -8,14 +8,10 @@ use std::{
 
 use binrw::{BinRead, BinReaderExt};
 
-use super::LogError;
+use super::{LogError, ReadOptions};
 
 /// Opcode and length, before each record's body.
 pub(super) const HEAD_LEN: u64 = 9;
-
-/// What one record or one chunk may take in memory. Recorders write chunks of 1 to 8 MB; the
-/// largest single messages (point clouds, images) have some hundred MB.
-pub(super) const MEMORY_LIMIT: u64 = 1 << 30;
 
 /// A record's opcode and where its parts stand.
 #[derive(Clone, Copy, Debug)]
@@ -41,10 +37,11 @@ pub(super) struct LogFile {
     pub(super) path: PathBuf,
     pub(super) file: File,
     pub(super) len: u64,
+    pub(super) options: ReadOptions,
 }
 
 impl LogFile {
-    pub(super) fn open(path: &Path) -> Result<Self, LogError> {
+    pub(super) fn open(path: &Path, options: ReadOptions) -> Result<Self, LogError> {
         let cannot = |source| LogError::Open { path: path.to_owned(), source };
         // Asked before opening, which would wait on a named pipe.
         let kind = fs::metadata(path).map_err(cannot)?;
@@ -54,7 +51,7 @@ impl LogFile {
         }
         let file = File::open(path).map_err(cannot)?;
         let len = file.metadata().map_err(cannot)?.len();
-        Ok(Self { path: path.to_owned(), file, len })
+        Ok(Self { path: path.to_owned(), file, len, options })
     }
 
     /// The file's bytes from `offset` on. Readers don't disturb each other.
@@ -74,11 +71,12 @@ impl LogFile {
             let what = format!("{what} claims {len} bytes, the file ends at {}", self.len);
             return Err(self.damaged(offset, what));
         }
-        if len > MEMORY_LIMIT {
+        if len > self.options.memory_limit {
             return Err(self.too_large(offset, what, len));
         }
-        buf.clear();
-        let read = self.reader(offset).take(len).read_to_end(buf);
+        // No clear before: only what it grows by is filled with zeros.
+        buf.resize(len as usize, 0);
+        let read = fill(self.reader(offset), buf);
         let read = read.map_err(|source| LogError::Read { path: self.path.clone(), offset, source })?;
         if (read as u64) < len {
             return Err(self.damaged(offset, format!("{what} ends {read} bytes on, the file became shorter")));
@@ -122,8 +120,22 @@ impl LogFile {
     }
 
     pub(super) fn too_large(&self, offset: u64, what: &'static str, size: u64) -> LogError {
-        LogError::TooLarge { path: self.path.clone(), offset, what, size, limit: MEMORY_LIMIT }
+        LogError::TooLarge { path: self.path.clone(), offset, what, size, limit: self.options.memory_limit }
     }
+}
+
+/// Reads until `buf` is full or the end is reached, and says how much that was.
+fn fill(mut reader: impl Read, buf: &mut [u8]) -> io::Result<usize> {
+    let mut filled = 0;
+    while let Some(rest) = buf.get_mut(filled..).filter(|rest| !rest.is_empty()) {
+        match reader.read(rest) {
+            Ok(0) => break,
+            Ok(read) => filled += read,
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(e),
+        }
+    }
+    Ok(filled)
 }
 
 /// A record's opcode and body length, `None` where `bytes` is too short for a head.

@@ -8,7 +8,7 @@ use mcap::records::{
 };
 
 use super::file::{HEAD_LEN, Head, LogFile, parse};
-use super::{LogError, Obstacle, chunk, output, survey};
+use super::{LogError, Obstacle, ReadOptions, chunk, output, survey};
 
 const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 const MAGIC_LEN: u64 = MAGIC.len() as u64;
@@ -162,7 +162,15 @@ impl Log {
     /// [`LogError::Open`], [`LogError::NotMcap`], [`LogError::CutOff`] when the end is missing,
     /// [`LogError::Damaged`] when the summary contradicts itself or the data section.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, LogError> {
-        let file = LogFile::open(path.as_ref())?;
+        Self::open_with(path, ReadOptions::default())
+    }
+
+    /// Opens a log that is to be read as `options` say: see [`Log::open`].
+    ///
+    /// # Errors
+    /// As [`Log::open`].
+    pub fn open_with(path: impl AsRef<Path>, options: ReadOptions) -> Result<Self, LogError> {
+        let file = LogFile::open(path.as_ref(), options)?;
         let mut index = read_summary(&file)?;
         let obstacle = survey::complete(&file, &mut index)?;
         Ok(Self { file, index, obstacle })
@@ -494,7 +502,7 @@ mod tests {
         let mut index = log_file.index().clone();
         index.chunks.push(index.chunks[0].clone());
         let (_dir, path) = on_disk(&log(chunked()));
-        let file = LogFile::open(&path).unwrap();
+        let file = LogFile::open(&path, ReadOptions::default()).unwrap();
         assert!(matches!(survey::complete(&file, &mut index), Err(LogError::Damaged { .. })));
     }
 }

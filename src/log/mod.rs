@@ -15,6 +15,7 @@
 
 mod addition;
 mod append;
+mod by_index;
 mod chunk;
 pub mod decode;
 mod error;
@@ -23,9 +24,12 @@ mod file;
 #[cfg(test)]
 mod fixture;
 mod ids;
+mod in_order;
 mod index;
 mod messages;
+mod options;
 mod output;
+mod part;
 mod summary;
 mod survey;
 mod times;
@@ -37,7 +41,8 @@ pub use error::{LogError, Obstacle};
 pub use excerpt::Excerpt;
 pub use index::{Index, LeftOut, Log, Schema};
 pub use mcap::records::{AttachmentIndex, Channel, ChunkIndex, MetadataIndex, Statistics};
-pub use messages::{Message, OwnedMessage};
+pub use messages::{Message, MessagesRead, OwnedMessage, bad_chunks, passed_over};
+pub use options::{Observer, Progress, ReadOptions, Work};
 pub use output::write_new;
 pub use times::TimesRead;
 pub use whole_part::WholePart;

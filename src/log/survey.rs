@@ -10,7 +10,7 @@ use mcap::records::{
     AttachmentHeader, AttachmentIndex, Channel, ChunkIndex, MessageHeader, MetadataIndex, Statistics, op,
 };
 
-use super::chunk::{self, Block};
+use super::chunk::{self, Block, Scratch};
 use super::file::{HEAD_LEN, Head, LogFile, parse};
 use super::index::{LeftOut, Schema, SummaryRecord, read_record};
 use super::summary::encode;
@@ -331,9 +331,9 @@ pub(super) fn count(statistics: &mut Statistics, message: &MessageHeader) {
 
 /// The first chunk that holds messages and no message index. Only chunks without one are read.
 fn first_without_message_index(file: &LogFile, index: &Index) -> Result<Option<Obstacle>, LogError> {
-    let mut buf = Vec::new();
+    let (mut buf, mut scratch) = (Vec::new(), Scratch::default());
     for chunk in index.chunks.iter().filter(|chunk| chunk.message_index_offsets.is_empty()) {
-        chunk::read_block(file, &Block::Chunk(chunk), &mut buf)?;
+        chunk::read_block(file, &Block::Chunk(chunk), &mut scratch, &mut buf)?;
         if chunk::records(&buf).flatten().any(|record| record.opcode == op::MESSAGE) {
             return Ok(Some(Obstacle::NoMessageIndex { offset: chunk.chunk_start_offset }));
         }

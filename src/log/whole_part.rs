@@ -5,8 +5,8 @@ use std::path::Path;
 
 use mcap::records::op;
 
-use super::chunk;
 use super::file::{HEAD_LEN, LogFile};
+use super::{ReadOptions, chunk};
 use crate::time::Time;
 
 /// After so many records the search ends: some seconds. A recording of 50 GB has about a million.
@@ -33,7 +33,7 @@ impl WholePart {
     /// Goes from record to record through the file; `None` where not even that can be begun.
     #[must_use]
     pub fn of(path: &Path) -> Option<Self> {
-        let file = LogFile::open(path).ok()?;
+        let file = LogFile::open(path, ReadOptions::default()).ok()?;
         // The magic; whoever asks knows that it is there.
         let mut found = Self { end: 8, file_len: file.len, ..Self::default() };
         for _ in 0..MOST_RECORDS {
