@@ -17,11 +17,9 @@ pub struct RegisteredCurve {
 }
 
 impl RegisteredCurve {
-    /// The curve over these pieces, from and to in s, in order: those of the samples at their true times.
-    #[must_use]
-    pub fn over(mut self, pieces: &[(f64, f64)]) -> Self {
+    /// Lets it reach over these pieces, from and to in s, in order: those of the samples at their true times.
+    pub fn cover(&mut self, pieces: &[(f64, f64)]) {
         self.pieces = pieces.to_vec();
-        self
     }
 
     /// The instant nearest to `time_s` that it covers, and how far that is away, s.
