@@ -11,6 +11,7 @@ mod viewer_rules;
 mod cli {
     mod bad_input;
     mod compare;
+    mod damaged_chunks;
     mod exit_code;
     mod export;
     mod init;
