@@ -124,21 +124,21 @@ const JOBS: [Job; 9] = [
 
 fn table(columns: &[(Kind, Rounds)], pairs: usize, megabytes: u64) -> String {
     let heads: Vec<&str> = columns.iter().map(|(kind, _)| kind.name()).collect();
-    let mut text = format!(
-        "Logs of {megabytes} MB, medians of {pairs} pairs.\n\n| ratio | aim | {} |\n|---|---|{}\n",
-        heads.join(" | "),
-        "---|".repeat(heads.len())
-    );
+    let (head, rule) = (heads.join(" | "), "---|".repeat(heads.len()));
+    let mut lines = vec![
+        format!("Logs of {megabytes} MB, medians of {pairs} pairs.\n"),
+        format!("| ratio | aim | {head} |\n|---|---|{rule}"),
+    ];
     for (name, aim, number) in ROWS {
         let cells: Vec<String> = columns.iter().map(|(_, rounds)| ratio(rounds, number)).collect();
-        text += &format!("| {name} | {aim} | {} |\n", cells.join(" | "));
+        lines.push(format!("| {name} | {aim} | {} |", cells.join(" | ")));
     }
-    text += &format!("\n| job | {} |\n|---|{}\n", heads.join(" | "), "---|".repeat(heads.len()));
+    lines.push(format!("\n| job | {head} |\n|---|{rule}"));
     for job in JOBS {
         let cells: Vec<String> = columns.iter().map(|(_, rounds)| job_cell(rounds, job)).collect();
-        text += &format!("| {job:?} | {} |\n", cells.join(" | "));
+        lines.push(format!("| {job:?} | {} |", cells.join(" | ")));
     }
-    text
+    lines.join("\n") + "\n"
 }
 
 fn ratio(rounds: &Rounds, number: fn(&dyn Fn(Job) -> f64) -> f64) -> String {

@@ -11,13 +11,16 @@ use crate::estimate::{EstimateError, spline};
 use crate::sample::{Quantity, Source};
 use crate::track::{Curve, State};
 
+/// The samples that were registered, and what came of it.
+type Registration<'a> = (Cow<'a, [Source]>, Registered);
+
 /// Registers what can be fitted of `sources`: the samples of the pieces that have enough of them; `None` where
 /// there is no such piece, or nothing is to be registered.
 pub(super) fn register_pieces<'a>(
     sources: &'a [Source],
     plan: &Plan,
     warnings: &mut Vec<String>,
-) -> Result<Option<(Cow<'a, [Source]>, Registered)>, EstimateError> {
+) -> Result<Option<Registration<'a>>, EstimateError> {
     let Some(settings) = &plan.registration else { return Ok(None) };
     let mut pieces: Vec<(f64, f64)> = Vec::new();
     let (mut lost_samples, mut lost_at) = (0, None);

@@ -107,13 +107,13 @@ impl Log {
     pub fn for_each_message<E: From<LogError>>(
         &self,
         channels: &BTreeSet<u16>,
-        mut f: impl FnMut(Message<'_>) -> Result<(), E>,
+        f: impl FnMut(Message<'_>) -> Result<(), E>,
     ) -> Result<MessagesRead, E> {
         let blocks = self.blocks_of(channels);
         let by_index = !self.file.options.whole_chunks && self.is_indexed(channels);
         let mut read = MessagesRead { parts: blocks.len(), ..MessagesRead::default() };
         let wanted = Wanted { channels: Some(channels), by_index };
-        self.for_each_wanted(&blocks, wanted, &mut read, |message| f(message))?;
+        self.for_each_wanted(&blocks, wanted, &mut read, f)?;
         Ok(read)
     }
 
