@@ -242,7 +242,11 @@ impl SourceError {
     pub fn is_usage(&self) -> bool {
         match self {
             Self::NoVector { fits, .. } => !fits.is_empty(),
-            Self::Log(_) | Self::Empty { .. } | Self::NoTime { .. } | Self::OneInstant { .. } => false,
+            Self::Log(_)
+            | Self::Unreadable { .. }
+            | Self::Empty { .. }
+            | Self::NoTime { .. }
+            | Self::OneInstant { .. } => false,
             _ => true,
         }
     }

@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::candidate::{Candidate, Judgement, judge};
+use super::candidate::{Candidate, Judged, Judgement, judge};
 use super::topic::{is_datum_like, is_reference, sensor_word};
 use super::{Ambiguity, SourceError, Unfit};
 use crate::config::SourceConfig;
@@ -42,18 +42,23 @@ pub struct Choice {
 /// # Errors
 /// [`SourceError::Unrecognised`] where no topic holds a sensor's word, [`SourceError::Ambiguous`] where
 /// several channels offer the same for one sensor, or several sensors could be the datum;
-/// [`SourceError::Log`] instead where a part of the log that was looked into is damaged.
+/// [`SourceError::Log`] instead where a part of the log that was looked into is damaged, and where nothing can be read
+/// of a sensor: without it another would become the datum.
 pub fn recognise(log: &Log, prefix: &str) -> Result<Recognised, SourceError> {
     let mut judgement = judge(log, prefix);
+    let lost = |channel: &Judged| {
+        let topic = &channel.topic;
+        channel.verdict == Err(Unfit::Unreadable) && sensor_word(topic).is_some() && !is_reference(topic)
+    };
     match judgement.sources() {
-        Ok(mut recognised) => {
+        Ok(mut recognised) if !judgement.channels.iter().any(lost) => {
             recognised.warnings.splice(..0, passed_over(&judgement.damaged));
             recognised.bad_chunks = bad_chunks(&judgement.damaged);
             Ok(recognised)
         }
         // What was not found may be what can't be read.
-        Err(_) if !judgement.damaged.is_empty() => Err(judgement.damaged.swap_remove(0).into()),
-        Err(error) => Err(error),
+        _ if !judgement.damaged.is_empty() => Err(judgement.damaged.swap_remove(0).into()),
+        other => other,
     }
 }
 
