@@ -58,6 +58,24 @@ pub struct Voice {
     pub quiet: bool,
 }
 
+/// What a log may take.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct Memory {
+    /// What one chunk or record of the log may take in memory
+    #[arg(long, value_name = "SIZE", default_value = "1GiB", value_parser = bytes)]
+    pub memory_limit: u64,
+}
+
+/// Such as `512MB` or `2GiB`.
+fn bytes(text: &str) -> Result<u64, String> {
+    let units = [("GiB", 1 << 30), ("MiB", 1 << 20), ("GB", 1_000_000_000), ("MB", 1_000_000), ("B", 1)];
+    let (number, unit) =
+        units.iter().find_map(|&(name, unit)| Some((text.strip_suffix(name)?, unit))).unwrap_or((text, 1));
+    let number: Option<u64> = number.trim().parse().ok();
+    let bytes = number.and_then(|n| n.checked_mul(unit)).filter(|bytes| (1..=1 << 40).contains(bytes));
+    bytes.ok_or_else(|| format!("expected a size up to 1024GiB, such as 512MB or 4GiB, got {text:?}"))
+}
+
 /// Arguments of `fuse`.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
@@ -92,6 +110,12 @@ pub struct Fuse {
     /// Prefix of the new topics [default: the config's, else /fused]
     #[arg(long)]
     pub prefix: Option<String>,
+    /// Read every chunk with sources whole and check its checksum, also uncompressed ones of which less would do
+    #[arg(long)]
+    pub check_chunks: bool,
+    /// What the log may take.
+    #[command(flatten)]
+    pub memory: Memory,
     /// How to talk.
     #[command(flatten)]
     pub voice: Voice,
@@ -168,6 +192,9 @@ pub struct Compare {
     /// Refuse a log that is damaged, instead of using what can be trusted
     #[arg(long)]
     pub strict: bool,
+    /// What the log may take.
+    #[command(flatten)]
+    pub memory: Memory,
     /// How to talk.
     #[command(flatten)]
     pub voice: Voice,
@@ -206,6 +233,9 @@ pub struct Export {
     /// Refuse a log that is damaged, instead of using what can be trusted
     #[arg(long)]
     pub strict: bool,
+    /// What the log may take.
+    #[command(flatten)]
+    pub memory: Memory,
     /// How to talk.
     #[command(flatten)]
     pub voice: Voice,
@@ -229,6 +259,9 @@ pub struct Inspect {
     /// Read all of the log, and check every checksum and index entry of it
     #[arg(long)]
     pub verify: bool,
+    /// What the log may take.
+    #[command(flatten)]
+    pub memory: Memory,
     /// How to talk.
     #[command(flatten)]
     pub voice: Voice,
@@ -250,6 +283,9 @@ pub struct Init {
     /// Replace an existing output
     #[arg(long)]
     pub force: bool,
+    /// What the log may take.
+    #[command(flatten)]
+    pub memory: Memory,
     /// How to talk.
     #[command(flatten)]
     pub voice: Voice,

@@ -205,8 +205,8 @@ pub fn check_epochs(loaded: &[Loaded], datum: usize) -> Result<(), ResolveError>
     let apart_s = |other: &Loaded| (other.timing.delay_s - of_datum.timing.delay_s).abs();
     match loaded.iter().find(|l| apart_s(l) > DIFFERENT_EPOCHS_S) {
         Some(other) => Err(ResolveError::Epochs {
-            first: of_datum.source.name.clone(),
-            second: other.source.name.clone(),
+            first: of_datum.config.name.clone(),
+            second: other.config.name.clone(),
             apart_s: apart_s(other),
         }),
         None => Ok(()),
@@ -220,7 +220,7 @@ pub fn warnings_of(loaded: &[Loaded], shift_s: Option<f64>) -> Vec<String> {
     let frames: BTreeMap<&str, &str> = loaded
         .iter()
         .filter(|l| !l.frame_id.is_empty())
-        .map(|l| (l.frame_id.as_str(), l.source.name.as_str()))
+        .map(|l| (l.frame_id.as_str(), l.config.name.as_str()))
         .collect();
     if frames.len() > 1 {
         let list: Vec<String> = frames.iter().map(|(frame, name)| format!("{name} in {frame:?}")).collect();

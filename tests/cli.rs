@@ -12,6 +12,7 @@ mod cli {
     mod bad_input;
     mod compare;
     mod crash;
+    mod damaged_chunks;
     mod exit_code;
     mod export;
     mod init;

@@ -23,7 +23,8 @@ use std::{
 };
 
 use trackfuse::log::{
-    Appender, Compression, Destination, Log, LogError, NewChannel, NewMessage, NewMetadata, Visibility, Written,
+    Appender, Compression, Destination, Log, LogError, NewChannel, NewMessage, NewMetadata, Visibility,
+    Written,
 };
 
 use raw::{

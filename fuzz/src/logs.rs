@@ -25,7 +25,7 @@ fn with_file<T>(data: &[u8], f: impl FnOnce(&Path, &Path) -> T) -> T {
 /// Channel, log time and length of a message.
 type Told = (u16, u64, usize);
 
-/// Every message of the log, up to the first part that can't be read.
+/// Every message of the log that can be read, and what is wrong with the rest.
 fn messages(log: &Log) -> (Vec<Told>, Result<(), LogError>) {
     let channels: BTreeSet<u16> = (0..=u16::MAX).collect();
     let mut found = Vec::new();
@@ -33,7 +33,9 @@ fn messages(log: &Log) -> (Vec<Told>, Result<(), LogError>) {
         found.push((message.channel_id, message.log_time, message.data.len()));
         Ok(())
     });
-    (found, read)
+    // What can't be read is passed over.
+    let whole = read.and_then(|read| read.damaged.into_iter().next().map_or(Ok(()), Err));
+    (found, whole)
 }
 
 /// Opens a log, and reads all that can be read of it.

@@ -1,10 +1,11 @@
 //! `trackfuse compare`: a track of a log against a reference channel of it.
 
+use super::progress::Bar;
 use super::{CommandError, Outcome, open, show};
 use crate::cli::Compare;
 use crate::estimate::characteristic_point::Height;
-use crate::log::Log;
 use crate::log::decode::MessagePath;
+use crate::log::{Log, passed_over};
 use crate::quality::{self, Comparison};
 use crate::report::{ComparisonParts, ComparisonReport, render_comparison};
 use crate::sample::Quantity;
@@ -17,7 +18,8 @@ use crate::time::Time;
 /// [`CommandError`] for a log that can't be read, a channel that doesn't fit, and two that have no instant in
 /// common.
 pub fn compare(args: &Compare) -> Result<Outcome, CommandError> {
-    let (log, damage) = open(&args.log, args.strict)?;
+    let bar = Bar::new(args.voice);
+    let (log, damage) = open(&args.log, args.memory, args.strict, &bar)?;
     let mut estimate = source::recorded(&log, &args.estimate)?;
     estimate.warnings.splice(..0, damage);
     let (mut reference, reference_origin) = source::reference(&log, &args.reference, args.reference_time)?;
@@ -26,7 +28,7 @@ pub fn compare(args: &Compare) -> Result<Outcome, CommandError> {
     for quantity in Quantity::ALL {
         reference.source.series_mut(quantity).iter_mut().for_each(|s| s.time_s += shift_s);
     }
-    let mut heights = heights_of_events(&log, &args.estimate)?;
+    let (mut heights, left_out) = heights_of_events(&log, &args.estimate)?;
     for height in &args.height {
         if !heights.contains(height) {
             heights.push(height.clone());
@@ -44,7 +46,9 @@ pub fn compare(args: &Compare) -> Result<Outcome, CommandError> {
             reference: span(reference.source.span_s()),
         });
     }
-    let warnings = warnings(&args.estimate, &estimate, &reference, &comparison);
+    let mut warnings = warnings(&args.estimate, &estimate, &reference, &comparison);
+    warnings.splice(..0, left_out.into_iter().filter(|w| !warnings.contains(w)).collect::<Vec<_>>());
+    drop(bar);
     let report = ComparisonReport::new(&ComparisonParts {
         log: &args.log.display().to_string(),
         topic: &args.estimate,
@@ -58,13 +62,13 @@ pub fn compare(args: &Compare) -> Result<Outcome, CommandError> {
     Ok(if warnings.is_empty() { Outcome::Done } else { Outcome::Warned })
 }
 
-/// The heights of the characteristic points that were written beside the track.
-fn heights_of_events(log: &Log, topic: &str) -> Result<Vec<Height>, CommandError> {
+/// The heights of the characteristic points that were written beside the track, and what can't be read of them.
+fn heights_of_events(log: &Log, topic: &str) -> Result<(Vec<Height>, Vec<String>), CommandError> {
     let prefix = topic.rsplit_once('/').map_or("", |(prefix, _)| prefix);
     let events = format!("{prefix}/events");
     let channels = log.index().channels_of(&events).map(|c| c.id).collect();
     let mut found: Vec<(Time, Height)> = Vec::new();
-    log.for_each_message(&channels, |message| {
+    let read = log.for_each_message(&channels, |message| {
         let value: serde_json::Value = serde_json::from_slice(message.data).unwrap_or_default();
         if let (Some(name), Some(z_m)) = (value["name"].as_str(), value["position"]["z"].as_f64()) {
             let time = Time::from_log(message.log_time).unwrap_or(Time::from_ns(0));
@@ -73,7 +77,7 @@ fn heights_of_events(log: &Log, topic: &str) -> Result<Vec<Height>, CommandError
         Ok::<_, crate::log::LogError>(())
     })?;
     found.sort_by_key(|(time, _)| *time);
-    Ok(found.into_iter().map(|(_, height)| height).collect())
+    Ok((found.into_iter().map(|(_, height)| height).collect(), passed_over(&read.damaged)))
 }
 
 /// What would make the numbers mean something else than they seem to.

@@ -2,6 +2,7 @@
 
 use std::io::{self, BufWriter, Write};
 
+use super::progress::Bar;
 use super::{CommandError, Outcome, open, say, show};
 use crate::cli::{Export, Format};
 use crate::log::{LogError, write_new};
@@ -16,12 +17,14 @@ use crate::source;
 /// written.
 pub fn export(args: &Export) -> Result<Outcome, CommandError> {
     let Format::Csv = args.format;
-    let (log, damage) = open(&args.log, args.strict)?;
+    let bar = Bar::new(args.voice);
+    let (log, damage) = open(&args.log, args.memory, args.strict, &bar)?;
     if let Some(out) = &args.output {
         log.ensure_other(out)?;
     }
     let mut recorded = source::recorded(&log, &args.topic)?;
     recorded.warnings.splice(..0, damage);
+    drop(bar);
     let t0 = recorded.origin();
     let warnings = &recorded.warnings;
     let mut report = ExportReport::new(args.log.display().to_string(), &args.topic, &recorded);

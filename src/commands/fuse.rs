@@ -4,16 +4,17 @@ use std::io::Read;
 
 use sha2::{Digest, Sha256};
 
+use super::progress::Bar;
 use super::{CommandError, Outcome, beside, damage_of, note, say};
 use crate::cli::Fuse;
 use crate::config::Config;
 use crate::fusion::{self, Fusion};
-use crate::log::{Appender, Destination, Log, LogError, NewMetadata, put_back};
+use crate::log::{Appender, Destination, Log, LogError, MessagesRead, NewMetadata, ReadOptions, put_back};
 use crate::publish::{Context, Topic, messages};
 use crate::report::{self, Report};
 use crate::resolve;
 use crate::sample::Source;
-use crate::source::{self, Candidate};
+use crate::source::{self, Candidate, Samples};
 use crate::time::Time;
 use crate::track::TrackPoint;
 
@@ -31,7 +32,14 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         let log = args.log.display();
         note(args.voice, &format!("a run that added to {log} was cut off: {log} is as it was before that"));
     }
-    let log = if args.in_place { Log::open_in_place(&args.log)? } else { Log::open(&args.log)? };
+    let bar = Bar::new(args.voice);
+    let options = ReadOptions {
+        memory_limit: args.memory.memory_limit,
+        whole_chunks: args.check_chunks,
+        observer: bar.observer(),
+    };
+    let open = if args.in_place { Log::open_in_place_with } else { Log::open_with };
+    let log = open(&args.log, options)?;
     let mut warnings = damage_of(&log, args.strict)?;
     let destination = destination(args);
     let channels = Topic::ALL.map(|topic| topic.channel(&config.output.prefix));
@@ -40,12 +48,17 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     let named = !config.source.is_empty();
     let (unused, of_sources) = choose_sources(&log, &mut config)?;
     warnings.extend(of_sources);
-    let (loaded, origin, left_out) = source::load(&log, &config.source, named)?;
+    let Samples { mut loaded, origin, left_out, mut read } = source::load(&log, &config.source, named)?;
+    ensure_whole(&mut read, &log, args)?;
+    let known = |sentence: &String| warnings.contains(sentence);
+    let left_out: Vec<String> = left_out.into_iter().filter(|sentence| !known(sentence)).collect();
     warnings.extend(left_out);
     config.source = loaded.iter().map(|l| l.config.clone()).collect();
     let datum = source::datum(&config.source);
     config.source[datum].datum = true;
-    let sources: Vec<Source> = loaded.iter().map(|l| l.source.clone()).collect();
+    // moved: copies would double what millions of samples take
+    let sources: Vec<Source> = loaded.iter_mut().map(|l| std::mem::take(&mut l.source)).collect();
+    bar.doing("fitting");
     let plan = resolve::plan(&mut config, &loaded, &sources, datum, origin, &mut warnings)?;
     let fusion = fusion::fuse(&sources, &plan)?;
     check_finite(&fusion)?;
@@ -66,6 +79,8 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         output: &output_name,
         t0,
         loaded: &loaded,
+        sources: &sources,
+        unchecked_chunks: read.unchecked,
         datum,
         unused: &unused,
         plan: &plan,
@@ -85,6 +100,8 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     };
     let metadata = metadata(&log, &config, &report)?;
     let mut appender = Appender::begin(&log, &destination, &channels, config.output.compression)?;
+    appender.leave_out(read.bad_chunks());
+    bar.doing("writing the track");
     for message in messages(&fusion, context, &text, &warnings) {
         appender.write(crate::log::NewMessage {
             channel: message.topic as usize,
@@ -94,6 +111,7 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     }
     appender.write_metadata(&metadata)?;
     appender.finish()?;
+    drop(bar);
     let files = if args.in_place {
         format!("{input_name}, in place")
     } else {
@@ -102,6 +120,19 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     let text = format!("{files}\n\n{text}");
     say(args.voice, &text, &report, &warnings);
     Ok(if warnings.is_empty() { Outcome::Done } else { Outcome::Warned })
+}
+
+/// Refuses damage that showed when the sources were read, where only a whole log will do.
+fn ensure_whole(read: &mut MessagesRead, log: &Log, args: &Fuse) -> Result<(), LogError> {
+    let bad = |error: &LogError| matches!(error, LogError::BadChunk { .. } | LogError::Damaged { .. });
+    let Some(first) = read.damaged.iter().position(bad).filter(|_| args.strict || args.in_place) else {
+        return Ok(());
+    };
+    let error = read.damaged.swap_remove(first);
+    if args.strict {
+        return Err(error);
+    }
+    Err(LogError::NotInPlace { path: log.path().to_owned(), source: std::io::Error::other(error) })
 }
 
 /// Where the track goes.

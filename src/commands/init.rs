@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
+use super::progress::Bar;
 use super::{CommandError, Outcome, open, show};
 use crate::cli::Init;
 use crate::config::{Config, SourceTable, template};
@@ -17,12 +18,14 @@ use crate::source;
 /// # Errors
 /// [`CommandError`] for a log that can't be read and an output that can't be written; then nothing is.
 pub fn init(args: &Init) -> Result<Outcome, CommandError> {
-    let (log, mut warnings) = open(&args.log, false)?;
+    let bar = Bar::new(args.voice);
+    let (log, mut warnings) = open(&args.log, args.memory, false, &bar)?;
     if let Some(output) = &args.output {
         log.ensure_other(output)?;
     }
     let proposal = source::propose(&log, &Config::default().output.prefix)?;
     warnings.extend(proposal.all_warnings());
+    drop(bar);
     let input = args.log.display().to_string();
     let config = template(&head(&input, args.output.as_deref(), &warnings), &proposal.tables);
     if let Some(output) = &args.output {

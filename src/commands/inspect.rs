@@ -1,10 +1,11 @@
 //! `trackfuse inspect`: log -> what is in it.
 
-use super::{CommandError, Outcome, show, warn};
+use super::progress::Bar;
+use super::{CommandError, Outcome, open, show, warn};
 use crate::cli::Inspect;
 use crate::config::Config;
 use crate::inspect::{inspect as look_into, verified};
-use crate::log::Log;
+use crate::log::Work;
 use crate::log::verify::verify;
 use crate::report;
 
@@ -13,8 +14,12 @@ use crate::report;
 /// # Errors
 /// [`CommandError::Log`] for a log that can't be opened.
 pub fn inspect(args: &Inspect) -> Result<Outcome, CommandError> {
-    let verification = args.verify.then(|| verify(&args.log, &mut |_, _| {})).transpose()?;
-    let log = Log::open(&args.log).inspect_err(|_| {
+    let bar = Bar::new(args.voice);
+    let verification = args
+        .verify
+        .then(|| verify(&args.log, &mut |done, total| bar.observer().tell(Work::Read, done, total)))
+        .transpose()?;
+    let (log, _) = open(&args.log, args.memory, false, &bar).inspect_err(|_| {
         // What a log that can't be opened has wrong with it is not for a report of what is in it.
         warn(args.voice, &verification.as_ref().map(verified::warnings).unwrap_or_default());
     })?;
@@ -22,6 +27,7 @@ pub fn inspect(args: &Inspect) -> Result<Outcome, CommandError> {
     if let Some(verification) = verification {
         verified::add(&mut inspection, verification);
     }
+    drop(bar);
     let text = report::render_inspection(&inspection);
     show(args.voice, &text, &inspection, &inspection.warnings)?;
     Ok(if inspection.warnings.is_empty() { Outcome::Done } else { Outcome::Warned })

@@ -5,6 +5,7 @@ mod export;
 mod fuse;
 mod init;
 mod inspect;
+mod progress;
 mod restore;
 mod simulate;
 
@@ -20,15 +21,16 @@ use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use crate::cli::Voice;
+use crate::cli::{Memory, Voice};
 use crate::config::ConfigError;
 use crate::estimate::EstimateError;
-use crate::log::{Log, LogError};
+use crate::log::{Log, LogError, ReadOptions};
 use crate::printable::printable;
 use crate::resolve::ResolveError;
 use crate::simulate::SimulateError;
 use crate::source::SourceError;
 use crate::time::Time;
+use progress::Bar;
 
 /// How a command ended that did what it should.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -148,9 +150,11 @@ impl From<Outcome> for ExitCode {
     }
 }
 
-/// Opens a log, and says what is wrong with it; refuses it then where only a whole one will do.
-fn open(path: &Path, strict: bool) -> Result<(Log, Vec<String>), LogError> {
-    let log = Log::open(path)?;
+/// Opens a command's log, and says what is wrong with it; refuses it then where only a whole one will do. `bar`
+/// shows how long work on it gets on.
+fn open(path: &Path, memory: Memory, strict: bool, bar: &Bar) -> Result<(Log, Vec<String>), LogError> {
+    let (memory_limit, observer) = (memory.memory_limit, bar.observer());
+    let log = Log::open_with(path, ReadOptions { memory_limit, observer, ..ReadOptions::default() })?;
     let warnings = damage_of(&log, strict)?;
     Ok((log, warnings))
 }

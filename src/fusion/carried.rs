@@ -110,13 +110,13 @@ fn points(
 
 /// The sources that see a piece's end, give or take two of their own intervals: one that stopped earlier may disagree
 /// with them. All of them where those have no position.
-fn seeing_the_end(piece: &Piece) -> Vec<Source> {
+fn seeing_the_end(piece: &Piece<'_>) -> Vec<Source> {
     let sees = |s: &&Source| {
         let late_s = median_interval_s(s).map_or(0.0, |interval_s| 2.0 * interval_s);
         s.span_s().is_some_and(|span| span.1 + late_s >= piece.to_s)
     };
     let last: Vec<Source> = piece.sources.iter().filter(sees).cloned().collect();
-    if last.iter().all(|s| s.positions.is_empty()) { piece.sources.clone() } else { last }
+    if last.iter().all(|s| s.positions.is_empty()) { piece.sources.to_vec() } else { last }
 }
 
 /// The length of the stretch before `to_s` that holds the last `count` instants with a position, s.

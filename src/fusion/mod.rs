@@ -12,8 +12,6 @@ mod carried;
 mod pieces;
 mod registered;
 
-use std::sync::Arc;
-
 use bands::{Bands, Unregistered, warn_of_disagreement, warn_of_misfit};
 use carried::Carried;
 use pieces::{Piece, fit_pieces};
@@ -139,11 +137,11 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
         registered = Some(found);
     }
     let coverage = Coverage::of(sources);
-    let curve = registered.as_mut().map(|r| {
-        Arc::make_mut(&mut r.curve).cover(coverage.pieces(plan.bridge_max_s));
-        Arc::clone(&r.curve)
-    });
-    let pieces = fit_pieces(sources, &coverage, plan, curve.as_ref(), &mut warnings)?;
+    if let Some(registered) = &mut registered {
+        registered.curve.cover(&coverage.pieces(plan.bridge_max_s));
+    }
+    let curve = registered.as_ref().map(|r| &r.curve);
+    let pieces = fit_pieces(sources, &coverage, plan, curve, &mut warnings)?;
 
     let disagreements = agreement::compare(sources, &coverage);
     let bands = if let Some(registered) = &registered {
@@ -177,17 +175,21 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
     }
 
     let track = Track { frame_id: plan.frame_id.clone(), points };
-    let fitted: Vec<(&[Source], &dyn Curve)> =
-        pieces.iter().map(|p| (p.sources.as_slice(), &*p.curve)).collect();
+    let fitted: Vec<(&[Source], &dyn Curve)> = pieces.iter().map(|p| (&*p.sources, &*p.curve)).collect();
     let residuals = quality::residuals(&fitted, plan.origin, &coverage);
+    drop(fitted);
+    let spline = pieces.last().and_then(|p| p.spline);
+    let spans = pieces.iter().map(|p| (p.from_s, p.to_s)).collect();
+    // they borrow the registered curve: a copy of it takes more than the samples
+    drop(pieces);
     Ok(Fusion {
         events: events(&track, plan, &mut warnings),
         phases: quality::phases(&track, plan.origin, &residuals),
         residuals,
         plain_pcf: Track { frame_id: plan.frame_id.clone(), points: carried.plain },
         track,
-        spline: pieces.last().and_then(|p| p.spline),
-        pieces: pieces.iter().map(|p| (p.from_s, p.to_s)).collect(),
+        spline,
+        pieces: spans,
         coverage,
         registered,
         disagreements,
@@ -197,7 +199,7 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
 }
 
 /// The points of a piece between its first and last sample.
-fn observed(piece: &Piece, coverage: &Coverage, bands: &Bands<'_>, plan: &Plan) -> Vec<TrackPoint> {
+fn observed(piece: &Piece<'_>, coverage: &Coverage, bands: &Bands<'_>, plan: &Plan) -> Vec<TrackPoint> {
     let point = |time_s| {
         let seen_by = coverage.seen_by(time_s);
         Some(TrackPoint {

@@ -1,6 +1,6 @@
 //! The pieces that long silences cut a log into, each fitted by the method that was asked for.
 
-use std::sync::Arc;
+use std::borrow::Cow;
 
 use super::{Plan, SplineSummary, grid};
 use crate::estimate::EstimateError;
@@ -15,26 +15,36 @@ use crate::time::Time;
 use crate::track::{Curve, State};
 
 /// A fitted piece.
-pub(super) struct Piece {
+pub(super) struct Piece<'a> {
     pub(super) from_s: f64,
     pub(super) to_s: f64,
-    pub(super) sources: Vec<Source>,
-    pub(super) curve: Box<dyn Curve>,
+    pub(super) sources: Cow<'a, [Source]>,
+    pub(super) curve: Box<dyn Curve + 'a>,
     pub(super) spline: Option<SplineSummary>,
 }
 
+/// What of `sources` lies within `[from_s, to_s]`; no copy where that is all.
+pub(super) fn within(sources: &[Source], from_s: f64, to_s: f64) -> Cow<'_, [Source]> {
+    let inside = |s: &Source| s.span_s().is_none_or(|(first, last)| from_s <= first && last <= to_s);
+    if sources.iter().all(inside) {
+        Cow::Borrowed(sources)
+    } else {
+        sources.iter().map(|s| s.within(from_s, to_s)).collect()
+    }
+}
+
 /// Fits every piece that can be, and warns of those that can't.
-pub(super) fn fit_pieces(
-    sources: &[Source],
+pub(super) fn fit_pieces<'a>(
+    sources: &'a [Source],
     coverage: &Coverage,
     plan: &Plan,
-    registered: Option<&Arc<RegisteredCurve>>,
+    registered: Option<&'a RegisteredCurve>,
     warnings: &mut Vec<String>,
-) -> Result<Vec<Piece>, EstimateError> {
+) -> Result<Vec<Piece<'a>>, EstimateError> {
     let (mut fitted, mut first_error) = (Vec::new(), None);
     let (mut lost_samples, mut lost_at) = (0, None);
     for (from_s, to_s) in coverage.pieces(plan.bridge_max_s) {
-        let inside: Vec<Source> = sources.iter().map(|s| s.within(from_s, to_s)).collect();
+        let inside = within(sources, from_s, to_s);
         match fit(&inside, from_s, to_s, plan, registered) {
             Ok((curve, spline)) => fitted.push(Piece { from_s, to_s, sources: inside, curve, spline }),
             Err(error) => {
@@ -77,31 +87,31 @@ pub(super) fn warn_of_lost(lost_samples: usize, first: Time, plan: &Plan, warnin
     ));
 }
 
-type Fitted = (Box<dyn Curve>, Option<SplineSummary>);
+type Fitted<'a> = (Box<dyn Curve + 'a>, Option<SplineSummary>);
 
 /// A curve that pieces share.
-struct Shared(Arc<RegisteredCurve>);
+struct Shared<'a>(&'a RegisteredCurve);
 
-impl Curve for Shared {
+impl Curve for Shared<'_> {
     fn at(&self, time_s: f64) -> Option<State> {
         self.0.at(time_s)
     }
 }
 
-fn fit(
+fn fit<'a>(
     sources: &[Source],
     from_s: f64,
     to_s: f64,
     plan: &Plan,
-    registered: Option<&Arc<RegisteredCurve>>,
-) -> Result<Fitted, EstimateError> {
+    registered: Option<&'a RegisteredCurve>,
+) -> Result<Fitted<'a>, EstimateError> {
     let got = instants(sources);
     if got < spline::MIN_SAMPLES {
         let what = plan.method.method().name().to_owned();
         return Err(EstimateError::TooFewSamples { what, needed: spline::MIN_SAMPLES, got });
     }
     if let (true, Some(curve)) = (plan.is_registered_spline(), registered) {
-        return Ok((Box::new(Shared(Arc::clone(curve))), None));
+        return Ok((Box::new(Shared(curve)), None));
     }
     match plan.method {
         Estimator::Sff => {

@@ -1,7 +1,9 @@
 //! Sources registered to the datum, and what a person must read of it.
 
+use std::borrow::Cow;
+
 use super::Plan;
-use super::pieces::{instants, warn_of_lost};
+use super::pieces::{instants, warn_of_lost, within};
 use crate::estimate::agreement::{self, Disagreement};
 use crate::estimate::coverage::Coverage;
 use crate::estimate::registration::{Kind, Name, Registered, Separation, register};
@@ -9,25 +11,23 @@ use crate::estimate::{EstimateError, spline};
 use crate::sample::{Quantity, Source};
 use crate::track::{Curve, State};
 
+/// The samples that were registered, and what came of it.
+type Registration<'a> = (Cow<'a, [Source]>, Registered);
+
 /// Registers what can be fitted of `sources`: the samples of the pieces that have enough of them; `None` where
 /// there is no such piece, or nothing is to be registered.
-pub(super) fn register_pieces(
-    sources: &[Source],
+pub(super) fn register_pieces<'a>(
+    sources: &'a [Source],
     plan: &Plan,
     warnings: &mut Vec<String>,
-) -> Result<Option<(Vec<Source>, Registered)>, EstimateError> {
+) -> Result<Option<Registration<'a>>, EstimateError> {
     let Some(settings) = &plan.registration else { return Ok(None) };
-    let (mut kept, mut pieces): (Vec<Source>, Vec<(f64, f64)>) =
-        (sources.iter().map(|s| Source { name: s.name.clone(), ..Source::default() }).collect(), Vec::new());
+    let mut pieces: Vec<(f64, f64)> = Vec::new();
     let (mut lost_samples, mut lost_at) = (0, None);
     for (from_s, to_s) in Coverage::of(sources).pieces(plan.bridge_max_s) {
-        let inside: Vec<Source> = sources.iter().map(|s| s.within(from_s, to_s)).collect();
+        let inside = within(sources, from_s, to_s);
         if instants(&inside) >= spline::MIN_SAMPLES && inside.iter().any(|s| !s.positions.is_empty()) {
             pieces.push((from_s, to_s));
-            for (all, part) in kept.iter_mut().zip(inside) {
-                all.positions.extend(part.positions);
-                all.velocities.extend(part.velocities);
-            }
         } else {
             lost_samples += inside.iter().map(Source::len).sum::<usize>();
             lost_at.get_or_insert(plan.origin.plus_seconds(from_s));
@@ -36,11 +36,25 @@ pub(super) fn register_pieces(
     if pieces.is_empty() {
         return Ok(None);
     }
-    if let Some(first) = lost_at {
-        warn_of_lost(lost_samples, first, plan, warnings);
-    }
+    let kept = match lost_at {
+        None => Cow::Borrowed(sources),
+        Some(first) => {
+            warn_of_lost(lost_samples, first, plan, warnings);
+            sources.iter().map(|s| of_pieces(s, &pieces)).collect()
+        }
+    };
     let registered = register(&kept, plan.datum, &pieces, settings)?;
     Ok(Some((kept, registered)))
+}
+
+/// The samples of a source that lie in one of `pieces`.
+fn of_pieces(source: &Source, pieces: &[(f64, f64)]) -> Source {
+    let mut kept = Source { name: source.name.clone(), ..Source::default() };
+    for part in pieces.iter().map(|&(from_s, to_s)| source.within(from_s, to_s)) {
+        kept.positions.extend(part.positions);
+        kept.velocities.extend(part.velocities);
+    }
+    kept
 }
 
 /// A state whose curve doesn't know what the registration leaves open: that of the registered curve at the nearest

@@ -99,6 +99,7 @@ fn unusable(judged: &Judged) -> Option<Unusable> {
         Unfit::Reference => "reference",
         Unfit::Undecodable(_) => "can't decode",
         Unfit::Silent => "no messages",
+        Unfit::Unreadable => "no message can be read",
         Unfit::NoVector(_) => "no position",
     };
     Some(Unusable { short: short.into(), reason: unfit.to_string() })

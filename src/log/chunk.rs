@@ -1,5 +1,6 @@
 //! The records of a chunk, decompressed and checked.
 
+use std::cmp::Ordering;
 use std::io::{self, BufRead, BufReader, Read};
 use std::ops::Range;
 
@@ -49,6 +50,15 @@ impl Block<'_> {
             Self::Chunk(chunk) => chunk.uncompressed_size,
             Self::Loose(range) => range.end - range.start,
             Self::Cut(cut) => cut.saved_bytes,
+        }
+    }
+
+    /// How many bytes it takes in the file.
+    pub(super) fn stored_size(&self) -> u64 {
+        match self {
+            Self::Chunk(chunk) => chunk.chunk_length,
+            Self::Loose(range) => range.end - range.start,
+            Self::Cut(cut) => cut.data.end - cut.data.start,
         }
     }
 
@@ -114,24 +124,106 @@ pub(super) fn look_at_cut(file: &LogFile, offset: u64) -> Result<Option<CutChunk
     Ok((start <= end).then_some(CutChunk { offset, header, data: start..end, saved_bytes: 0 }))
 }
 
+/// What decoding takes beside the result; it serves one chunk after the other.
+#[derive(Default)]
+pub(super) struct Scratch {
+    compressed: Vec<u8>,
+    zstd: Option<zstd::bulk::Decompressor<'static>>,
+}
+
+/// Above this a chunk's own header is believed only where the index says the same: how many chunks may be in memory
+/// at once is decided by the index.
+const UNANNOUNCED: u64 = 8 << 20;
+/// Memory that is kept for the next chunk, bytes.
+const KEPT: usize = 16 << 20;
+
 /// Puts the records of `block` into `buf`. A chunk's size and checksum are checked; of one that is cut off the
 /// whole records are taken, which nothing checks.
-pub(super) fn read_block(file: &LogFile, block: &Block<'_>, buf: &mut Vec<u8>) -> Result<(), LogError> {
-    let chunk = match block {
-        Block::Loose(range) => {
-            return file.read_into(range.start, range.end - range.start, "a run of records", buf);
-        }
-        Block::Cut(cut) => return read_cut(file, cut, buf),
-        Block::Chunk(chunk) => chunk,
-    };
+///
+/// # Errors
+/// [`LogError::BadChunk`] for a chunk that can't be decoded; [`LogError::TooLarge`];
+/// [`LogError::UnknownCompression`]; [`LogError::Read`].
+pub(super) fn read_block(
+    file: &LogFile,
+    block: &Block<'_>,
+    scratch: &mut Scratch,
+    buf: &mut Vec<u8>,
+) -> Result<(), LogError> {
+    match block {
+        Block::Loose(range) => file.read_into(range.start, range.end - range.start, "a run of records", buf),
+        Block::Cut(cut) => read_cut(file, cut, buf),
+        Block::Chunk(chunk) => read_chunk(file, chunk, scratch, buf).map_err(LogError::of_chunk),
+    }
+}
+
+fn read_chunk(
+    file: &LogFile,
+    chunk: &ChunkIndex,
+    scratch: &mut Scratch,
+    buf: &mut Vec<u8>,
+) -> Result<(), LogError> {
     let offset = chunk.chunk_start_offset;
     let (header, data) = read_header(file, offset, offset.saturating_add(chunk.chunk_length).min(file.len))?;
-    let compressed = BufReader::with_capacity(1 << 17, file.reader(data.start).take(data.end - data.start));
-    decompress(file, offset, &header, compressed, buf)?;
+    let (size, len) = (header.uncompressed_size, data.end - data.start);
+    if size > file.options.memory_limit {
+        return Err(file.too_large(offset, "the chunk", size));
+    }
+    if size > chunk.uncompressed_size.max(UNANNOUNCED) || len > chunk.compressed_size.max(UNANNOUNCED) {
+        let said = (chunk.compressed_size, chunk.uncompressed_size);
+        let what =
+            format!("the chunk claims {len} bytes, {size} uncompressed, its index {} and {}", said.0, said.1);
+        return Err(file.damaged(offset, what));
+    }
+    let compressed = &mut scratch.compressed;
+    let done = match header.compression.as_str() {
+        // One byte more than claimed tells a chunk that holds more from one that is right.
+        "" => file.read_into(data.start, len.min(size + 1), "a chunk", buf).map(|()| Ok(())),
+        "zstd" => file
+            .read_into(data.start, len, "a chunk", compressed)
+            .map(|()| unpack_zstd(&mut scratch.zstd, compressed, size, buf)),
+        "lz4" => file.read_into(data.start, len, "a chunk", compressed).map(|()| {
+            buf.clear();
+            lz4::Decoder::new(&compressed[..]).and_then(|d| d.take(size + 1).read_to_end(buf)).map(drop)
+        }),
+        name => {
+            let (path, name) = (file.path.clone(), name.to_owned());
+            return Err(LogError::UnknownCompression { path, offset, name });
+        }
+    }?;
+    if compressed.capacity() > KEPT {
+        *compressed = Vec::new();
+    }
+    done.map_err(|e| file.damaged(offset, format!("the chunk can't be decompressed: {e}")))?;
+    check_size(file, offset, size, buf)?;
     check_crc(file, offset, &header, buf)
 }
 
-/// Puts the records of the chunk at `offset` into `buf`, as many bytes as its header claims.
+/// Puts up to `size` bytes, or more where there are more, into `buf`: at once, which is faster than a stream.
+fn unpack_zstd(
+    decompressor: &mut Option<zstd::bulk::Decompressor<'static>>,
+    compressed: &[u8],
+    size: u64,
+    buf: &mut Vec<u8>,
+) -> io::Result<()> {
+    let decompressor = match decompressor {
+        Some(decompressor) => decompressor,
+        None => decompressor.insert(zstd::bulk::Decompressor::new()?),
+    };
+    buf.clear();
+    // Memory that is taken, but not touched, where the chunk claims more than it holds.
+    buf.try_reserve_exact(size as usize + 1).map_err(io::Error::other)?;
+    let Err(error) = decompressor.decompress_to_buffer(compressed, buf) else { return Ok(()) };
+    // Whether it is bad, or holds more than it claims, a stream tells.
+    buf.clear();
+    let mut stream = zstd::Decoder::with_buffer(compressed)?.take(size + 1);
+    if io::copy(&mut stream, &mut io::sink())? > size {
+        buf.resize(size as usize + 1, 0);
+        return Ok(());
+    }
+    Err(error)
+}
+
+/// Puts the records of the chunk at `offset` into `buf`, as many bytes as its header claims, from a stream.
 pub(super) fn decompress(
     file: &LogFile,
     offset: u64,
@@ -140,17 +232,22 @@ pub(super) fn decompress(
     buf: &mut Vec<u8>,
 ) -> Result<(), LogError> {
     let size = header.uncompressed_size;
-    if size > file.memory_limit {
+    if size > file.options.memory_limit {
         return Err(file.too_large(offset, "the chunk", size));
     }
     // One byte more than claimed tells a chunk that holds more from one that is right.
     stream(file, offset, header, compressed, size + 1, buf)?
         .map_err(|e| file.damaged(offset, format!("the chunk can't be decompressed: {e}")))?;
-    if buf.len() as u64 != size {
-        let relation = if buf.len() as u64 > size { "more than" } else { "less than" };
-        return Err(file.damaged(offset, format!("the chunk holds {relation} the {size} bytes it claims")));
-    }
-    Ok(())
+    check_size(file, offset, size, buf)
+}
+
+fn check_size(file: &LogFile, offset: u64, size: u64, records: &[u8]) -> Result<(), LogError> {
+    let relation = match (records.len() as u64).cmp(&size) {
+        Ordering::Equal => return Ok(()),
+        Ordering::Greater => "more than",
+        Ordering::Less => "less than",
+    };
+    Err(file.damaged(offset, format!("the chunk holds {relation} the {size} bytes it claims")))
 }
 
 /// What can be decompressed of a chunk that is cut off, up to its last whole record.
@@ -159,7 +256,7 @@ fn read_cut(file: &LogFile, cut: &CutChunk, buf: &mut Vec<u8>) -> Result<(), Log
     let compressed = file.reader(cut.data.start).take(cut.data.end - cut.data.start);
     let compressed = BufReader::with_capacity(1 << 17, compressed);
     // That it ends too early is no news.
-    let _ = stream(file, cut.offset, &cut.header, compressed, size.min(file.memory_limit), buf)?;
+    let _ = stream(file, cut.offset, &cut.header, compressed, size.min(file.options.memory_limit), buf)?;
     if buf.len() as u64 == size {
         check_crc(file, cut.offset, &cut.header, buf)?;
     }
@@ -233,23 +330,4 @@ pub(super) fn records(mut bytes: &[u8]) -> impl Iterator<Item = Result<Record<'_
         bytes = bytes.get(record.whole.len()..).unwrap_or_default();
         Some(Ok(record))
     })
-}
-
-/// Hands every record of `blocks` to `f`, one block in memory at a time.
-pub(super) fn for_each_record<'b, E: From<LogError>>(
-    file: &LogFile,
-    blocks: impl IntoIterator<Item = Block<'b>>,
-    mut f: impl FnMut(&Block<'b>, Record<'_>) -> Result<(), E>,
-) -> Result<(), E> {
-    let mut buf = Vec::new();
-    for block in blocks {
-        read_block(file, &block, &mut buf)?;
-        for record in records(&buf) {
-            let record = record.map_err(|left| {
-                file.damaged(block.offset(), format!("the last {left} bytes of the chunk are no record"))
-            })?;
-            f(&block, record)?;
-        }
-    }
-    Ok(())
 }

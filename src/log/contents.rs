@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use mcap::records::{ChunkIndex, MessageHeader, Statistics, op};
 
 use super::LogError;
-use super::chunk::{self, Block};
+use super::chunk::{self, Block, Scratch};
 use super::file::{LogFile, parse};
 use super::times;
 
@@ -31,11 +31,14 @@ pub(super) enum Closed {
 pub(super) fn look_into(
     file: &LogFile,
     block: &Block<'_>,
+    scratch: &mut Scratch,
     buf: &mut Vec<u8>,
 ) -> Result<Result<Contents, Closed>, LogError> {
-    match contents(file, block, buf) {
+    match contents(file, block, scratch, buf) {
         Ok(contents) => Ok(Ok(contents)),
-        Err(LogError::Damaged { what, .. }) => Ok(Err(Closed::Undecodable(what))),
+        Err(LogError::Damaged { what, .. } | LogError::BadChunk { what, .. }) => {
+            Ok(Err(Closed::Undecodable(what)))
+        }
         Err(LogError::TooLarge { size, limit, .. }) => Ok(Err(Closed::Unread(format!(
             "the chunk claims {size} bytes, more than the limit of {limit}: it was not read"
         )))),
@@ -46,8 +49,13 @@ pub(super) fn look_into(
     }
 }
 
-fn contents(file: &LogFile, block: &Block<'_>, buf: &mut Vec<u8>) -> Result<Contents, LogError> {
-    chunk::read_block(file, block, buf)?;
+fn contents(
+    file: &LogFile,
+    block: &Block<'_>,
+    scratch: &mut Scratch,
+    buf: &mut Vec<u8>,
+) -> Result<Contents, LogError> {
+    chunk::read_block(file, block, scratch, buf)?;
     let mut found = Contents::default();
     let mut seen = BTreeSet::new();
     for record in chunk::records(buf) {

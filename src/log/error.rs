@@ -55,6 +55,16 @@ pub enum LogError {
         /// What was found, and what was expected.
         what: String,
     },
+    /// A whole chunk that can't be decoded: its checksum is wrong, or its content is not what its header says.
+    #[error("{path:?} is damaged at offset {offset}: {what}")]
+    BadChunk {
+        /// The log.
+        path: PathBuf,
+        /// Where the chunk begins.
+        offset: u64,
+        /// What was found, and what was expected.
+        what: String,
+    },
     /// A part of the file is larger than this program takes into memory.
     #[error("{path:?}: {what} at offset {offset} claims {size} bytes, more than the limit of {limit}")]
     TooLarge {
@@ -178,18 +188,27 @@ pub enum LogError {
 }
 
 impl LogError {
+    /// Damage found while a chunk was read is the chunk's.
+    pub(super) fn of_chunk(self) -> Self {
+        match self {
+            Self::Damaged { path, offset, what } => Self::BadChunk { path, offset, what },
+            other => other,
+        }
+    }
+
     /// What the user can do about it, for a line of its own.
     #[must_use]
     pub fn hint(&self) -> Option<String> {
         let hint = match self {
             Self::NotMcap { .. } => "trackfuse reads MCAP; `mcap convert` makes one of a ROS bag",
-            Self::CutOff { .. } | Self::Damaged { .. } => {
+            Self::CutOff { .. } | Self::Damaged { .. } | Self::BadChunk { .. } => {
                 "`mcap recover IN -o OUT` saves what is readable (it drops private records and bad chunks)"
             }
             Self::NotWhole { .. } => "without `--strict`, what can be trusted is used, and the rest is named",
             Self::TopicTaken { .. } => {
                 "choose another name with `--prefix`, or take off what was added with `trackfuse restore LOG`"
             }
+            Self::TooLarge { .. } => "`--memory-limit 4GB`, say, takes larger ones into memory",
             Self::OutputExists { .. } => "`--force` replaces it, `-o` names another",
             Self::OutputIsInput { .. } => {
                 "`-o` names another output; `--in-place` adds to the log itself, where a command has it"

@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 
 use super::chunk::Block;
-use super::{Log, LogError, Message};
+use super::part::Wanted;
+use super::{Log, LogError, Message, MessagesRead};
 
 /// How much of the parts that hold the wanted channels was read.
 #[derive(Debug, Default)]
@@ -32,21 +33,23 @@ impl Log {
         budget_bytes: u64,
         mut f: impl FnMut(Message<'_>),
     ) -> Excerpt {
-        let wanted = |block: &Block<'_>| channels.iter().any(|&id| block.may_hold(id));
-        let blocks: Vec<Block<'_>> = self.blocks().into_iter().filter(wanted).collect();
+        let blocks = self.blocks_of(channels);
         let chosen = choose(&blocks, channels, budget_bytes);
-        let mut excerpt = Excerpt { parts: blocks.len(), read: chosen.len(), ..Excerpt::default() };
-        for block in chosen.into_iter().filter_map(|i| blocks.get(i)) {
-            excerpt.chunks_read += usize::from(matches!(block, Block::Chunk(_)));
-            let read = self.for_each_message_of([block.clone()], |message| {
-                if channels.contains(&message.channel_id) {
-                    f(message);
-                }
-                Ok::<_, LogError>(())
-            });
-            excerpt.damaged.extend(read.err());
+        let parts = blocks.len();
+        let chosen: Vec<Block<'_>> = chosen.into_iter().filter_map(|i| blocks.get(i).cloned()).collect();
+        let wanted = Wanted { channels: Some(channels), by_index: false };
+        let mut read = MessagesRead::default();
+        let done = self.for_each_wanted(&chosen, wanted, &mut read, |message| {
+            f(message);
+            Ok::<_, LogError>(())
+        });
+        read.damaged.extend(done.err());
+        Excerpt {
+            parts,
+            read: chosen.len(),
+            chunks_read: chosen.iter().filter(|block| matches!(block, Block::Chunk(_))).count(),
+            damaged: read.damaged,
         }
-        excerpt
     }
 }
 
@@ -113,6 +116,6 @@ mod tests {
         let (_dir, path) = on_disk(&bytes);
         let (rest, excerpt) = numbers(&Log::open(path).unwrap(), 1, u64::MAX);
         assert!(!rest.is_empty() && !rest.contains(&0));
-        assert!(matches!(excerpt.damaged.as_slice(), [LogError::Damaged { .. }]), "{excerpt:?}");
+        assert!(matches!(excerpt.damaged.as_slice(), [LogError::BadChunk { .. }]), "{excerpt:?}");
     }
 }

@@ -8,14 +8,10 @@ use std::{
 
 use binrw::{BinRead, BinReaderExt};
 
-use super::{LogError, undo};
+use super::{LogError, ReadOptions, undo};
 
 /// Opcode and length, before each record's body.
 pub(super) const HEAD_LEN: u64 = 9;
-
-/// What one record or one chunk may take in memory, bytes, unless the caller says else. Recorders write chunks of 1 to 8 MB; the
-/// largest single messages (point clouds, images) have some hundred MB.
-pub(super) const MEMORY_LIMIT: u64 = 1 << 30;
 
 /// A record's opcode and where its parts stand.
 #[derive(Clone, Copy, Debug)]
@@ -41,23 +37,22 @@ pub(super) struct LogFile {
     pub(super) path: PathBuf,
     pub(super) file: File,
     pub(super) len: u64,
-    /// What one record or one chunk may take in memory, bytes.
-    pub(super) memory_limit: u64,
+    pub(super) options: ReadOptions,
     /// Whether nobody else reads or writes it by this program meanwhile, and it can be changed.
     pub(super) is_exclusive: bool,
 }
 
 impl LogFile {
     /// Opens a log that no run was cut off in.
-    pub(super) fn open(path: &Path, memory_limit: u64) -> Result<Self, LogError> {
-        let file = Self::open_shared(path, memory_limit)?;
+    pub(super) fn open(path: &Path, options: ReadOptions) -> Result<Self, LogError> {
+        let file = Self::open_shared(path, options)?;
         undo::refuse_pending(path)?;
         Ok(file)
     }
 
     /// Opens a log for reading, which others may read too, but not change.
-    pub(super) fn open_shared(path: &Path, memory_limit: u64) -> Result<Self, LogError> {
-        let log = Self::open_with(path, OpenOptions::new().read(true), memory_limit)?;
+    pub(super) fn open_shared(path: &Path, options: ReadOptions) -> Result<Self, LogError> {
+        let log = Self::open_for(path, OpenOptions::new().read(true), options)?;
         match log.file.try_lock_shared() {
             Err(TryLockError::WouldBlock) => Err(LogError::InUse { path: path.to_owned() }),
             // Where there are no locks nothing is changed in place either.
@@ -66,9 +61,9 @@ impl LogFile {
     }
 
     /// Opens a log to change it, for nobody else.
-    pub(super) fn open_exclusive(path: &Path, memory_limit: u64) -> Result<Self, LogError> {
+    pub(super) fn open_exclusive(path: &Path, options: ReadOptions) -> Result<Self, LogError> {
         let refused = |source| LogError::NotInPlace { path: path.to_owned(), source };
-        let log = match Self::open_with(path, OpenOptions::new().read(true).write(true), memory_limit) {
+        let log = match Self::open_for(path, OpenOptions::new().read(true).write(true), options) {
             Err(LogError::Open { source, .. })
                 if matches!(
                     source.kind(),
@@ -86,7 +81,7 @@ impl LogFile {
         }
     }
 
-    fn open_with(path: &Path, options: &OpenOptions, memory_limit: u64) -> Result<Self, LogError> {
+    fn open_for(path: &Path, access: &OpenOptions, options: ReadOptions) -> Result<Self, LogError> {
         let cannot = |source| LogError::Open { path: path.to_owned(), source };
         // Asked before opening, which would wait on a named pipe.
         let kind = fs::metadata(path).map_err(cannot)?;
@@ -94,9 +89,9 @@ impl LogFile {
             let found = if kind.is_dir() { "it is a directory" } else { "it is no regular file" };
             return Err(cannot(io::Error::other(found)));
         }
-        let file = options.open(path).map_err(cannot)?;
+        let file = access.open(path).map_err(cannot)?;
         let len = file.metadata().map_err(cannot)?.len();
-        Ok(Self { path: path.to_owned(), file, len, memory_limit, is_exclusive: false })
+        Ok(Self { path: path.to_owned(), file, len, options, is_exclusive: false })
     }
 
     /// The file's bytes from `offset` on. Readers don't disturb each other.
@@ -116,11 +111,12 @@ impl LogFile {
             let what = format!("{what} claims {len} bytes, the file ends at {}", self.len);
             return Err(self.damaged(offset, what));
         }
-        if len > self.memory_limit {
+        if len > self.options.memory_limit {
             return Err(self.too_large(offset, what, len));
         }
-        buf.clear();
-        let read = self.reader(offset).take(len).read_to_end(buf);
+        // No clear before: only what it grows by is filled with zeros.
+        buf.resize(len as usize, 0);
+        let read = fill(self.reader(offset), buf);
         let read = read.map_err(|source| LogError::Read { path: self.path.clone(), offset, source })?;
         if (read as u64) < len {
             return Err(self.damaged(offset, format!("{what} ends {read} bytes on, the file became shorter")));
@@ -164,8 +160,22 @@ impl LogFile {
     }
 
     pub(super) fn too_large(&self, offset: u64, what: &'static str, size: u64) -> LogError {
-        LogError::TooLarge { path: self.path.clone(), offset, what, size, limit: self.memory_limit }
+        LogError::TooLarge { path: self.path.clone(), offset, what, size, limit: self.options.memory_limit }
     }
+}
+
+/// Reads until `buf` is full or the end is reached, and says how much that was.
+fn fill(mut reader: impl Read, buf: &mut [u8]) -> io::Result<usize> {
+    let mut filled = 0;
+    while let Some(rest) = buf.get_mut(filled..).filter(|rest| !rest.is_empty()) {
+        match reader.read(rest) {
+            Ok(0) => break,
+            Ok(read) => filled += read,
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(e),
+        }
+    }
+    Ok(filled)
 }
 
 /// A record's opcode and body length, `None` where `bytes` is too short for a head.

@@ -8,7 +8,7 @@ use super::damage::Damages;
 use super::ending::may_stand_in_data;
 use super::file::{HEAD_LEN, Head, LogFile};
 use super::index::{SummaryRecord, read_record};
-use super::messages::MESSAGE_HEADER_LEN;
+use super::part::MESSAGE_HEADER_LEN;
 use super::summary::encode;
 use super::{Index, LogError, chunk};
 

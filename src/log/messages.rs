@@ -1,14 +1,11 @@
-//! Messages, only those asked for, one chunk in memory at a time.
+//! Messages, only those asked for, a few chunks in memory at a time.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use mcap::records::{MessageHeader, op};
-
-use super::file::{LogFile, parse};
-use super::{Log, LogError, chunk};
-
-/// Channel, sequence, two times, before a message's payload.
-pub(super) const MESSAGE_HEADER_LEN: usize = 2 + 4 + 8 + 8;
+use super::chunk::{Block, Scratch};
+use super::in_order::for_each_part;
+use super::part::{Part, Wanted};
+use super::{Log, LogError, Work};
 
 /// A message as it stands in the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,24 +44,77 @@ impl From<Message<'_>> for OwnedMessage {
     }
 }
 
+/// How messages were read.
+#[derive(Debug, Default)]
+pub struct MessagesRead {
+    /// Chunks, and runs of messages outside chunks, that may hold one of the channels.
+    pub parts: usize,
+    /// How many of them are chunks that were read by message index, so that their checksums were not checked.
+    pub unchecked: usize,
+    /// What could not be read, or not all of it, and was passed over.
+    pub damaged: Vec<LogError>,
+}
+
+impl MessagesRead {
+    /// Where the chunks begin that can't be decoded at all: no index should lead to them.
+    #[must_use]
+    pub fn bad_chunks(&self) -> BTreeSet<u64> {
+        bad_chunks(&self.damaged)
+    }
+}
+
+/// A sentence on each thing that was passed over, the first of many only.
+#[must_use]
+pub fn passed_over(damaged: &[LogError]) -> Vec<String> {
+    const NAMED: usize = 8;
+    let sentence = |error: &LogError| {
+        let hint = match error {
+            LogError::TooLarge { .. } => error.hint().map_or(String::new(), |hint| format!(" ({hint})")),
+            _ => String::new(),
+        };
+        format!("{error}; what can't be read there is left out{hint}")
+    };
+    let mut sentences: Vec<String> = damaged.iter().take(NAMED).map(sentence).collect();
+    if damaged.len() > NAMED {
+        let rest = damaged.len() - NAMED;
+        sentences.push(format!("{rest} more parts of the log can't be read, and are left out"));
+    }
+    sentences
+}
+
+/// Where the chunks begin that some of `errors` say can't be decoded.
+#[must_use]
+pub fn bad_chunks(errors: &[LogError]) -> BTreeSet<u64> {
+    let bad = |error: &LogError| match error {
+        LogError::BadChunk { offset, .. } => Some(*offset),
+        _ => None,
+    };
+    errors.iter().filter_map(bad).collect()
+}
+
 impl Log {
     /// Hands the messages of `channels` to `f`, in file order, which need not be the order of time.
     ///
-    /// Reads only chunks that hold one of the channels, and checks their CRCs before it hands on
-    /// anything of them.
+    /// Reads only chunks that hold one of the channels, several at a time, and checks their CRCs before it hands on
+    /// anything of them. Of uncompressed chunks in which the messages lie far apart only these are read, without the
+    /// CRC ([`MessagesRead::unchecked`]), unless [`whole_chunks`](super::ReadOptions::whole_chunks) is asked for.
+    ///
+    /// What can't be decoded is passed over and named in the answer: damage as [`LogError::BadChunk`] or
+    /// [`LogError::Damaged`], and [`LogError::TooLarge`] or [`LogError::UnknownCompression`].
     ///
     /// # Errors
-    /// Whatever `f` returns; [`LogError::Damaged`] naming the chunk's offset when its CRC or size is
-    /// wrong; [`LogError::TooLarge`] above 1 GiB; [`LogError::UnknownCompression`].
+    /// Whatever `f` returns; [`LogError::Read`].
     pub fn for_each_message<E: From<LogError>>(
         &self,
         channels: &BTreeSet<u16>,
-        mut f: impl FnMut(Message<'_>) -> Result<(), E>,
-    ) -> Result<(), E> {
-        let wanted = |block: &chunk::Block<'_>| channels.iter().any(|&id| block.may_hold(id));
-        self.for_each_message_of(self.blocks().into_iter().filter(wanted), |message| {
-            if channels.contains(&message.channel_id) { f(message) } else { Ok(()) }
-        })
+        f: impl FnMut(Message<'_>) -> Result<(), E>,
+    ) -> Result<MessagesRead, E> {
+        let blocks = self.blocks_of(channels);
+        let by_index = !self.file.options.whole_chunks && self.is_indexed(channels);
+        let mut read = MessagesRead { parts: blocks.len(), ..MessagesRead::default() };
+        let wanted = Wanted { channels: Some(channels), by_index };
+        self.for_each_wanted(&blocks, wanted, &mut read, f)?;
+        Ok(read)
     }
 
     /// The first message in the file of each of `channels` that has one, reading as few chunks as
@@ -73,6 +123,7 @@ impl Log {
     pub fn first_messages(&self, channels: &BTreeSet<u16>) -> (BTreeMap<u16, OwnedMessage>, Vec<LogError>) {
         let mut missing = channels.clone();
         let (mut first, mut damaged) = (BTreeMap::new(), Vec::new());
+        let (mut part, mut scratch) = (Part::default(), Scratch::default());
         for block in self.blocks() {
             if missing.is_empty() {
                 break;
@@ -80,40 +131,48 @@ impl Log {
             if !missing.iter().any(|&id| block.may_hold(id)) {
                 continue;
             }
-            let read = self.for_each_message_of([block], |message| {
+            let wanted = Wanted { channels: Some(&missing), by_index: false };
+            part.read(&self.file, &block, wanted, &mut scratch);
+            for message in part.messages() {
                 if missing.remove(&message.channel_id) {
                     first.insert(message.channel_id, message.into());
                 }
-                Ok::<_, LogError>(())
-            });
-            damaged.extend(read.err());
+            }
+            damaged.extend(part.damage.take());
         }
         (first, damaged)
     }
 
-    /// Hands all messages of `blocks` to `f`.
-    pub(super) fn for_each_message_of<'b, E: From<LogError>>(
+    /// The parts that may hold a message of `channels`, in file order.
+    pub(super) fn blocks_of(&self, channels: &BTreeSet<u16>) -> Vec<Block<'_>> {
+        let wanted = |block: &Block<'_>| channels.iter().any(|&id| block.may_hold(id));
+        self.blocks().into_iter().filter(wanted).collect()
+    }
+
+    /// Hands the wanted messages of `blocks` to `f`, in file order, passes over what is damaged, and tells how far
+    /// it is.
+    pub(super) fn for_each_wanted<E: From<LogError>>(
         &self,
-        blocks: impl IntoIterator<Item = chunk::Block<'b>>,
+        blocks: &[Block<'_>],
+        wanted: Wanted<'_>,
+        read: &mut MessagesRead,
         mut f: impl FnMut(Message<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
-        chunk::for_each_record(&self.file, blocks, |block, record| match record.opcode {
-            op::MESSAGE => f(message(&self.file, block, record.body)?),
-            _ => Ok(()),
+        let observer = &self.file.options.observer;
+        let total: u64 = blocks.iter().fold(0, |sum, block| sum.saturating_add(block.stored_size()));
+        let mut done = 0_u64;
+        for_each_part(&self.file, blocks, wanted, |block, part| {
+            part.messages().try_for_each(&mut f)?;
+            read.unchecked += usize::from(part.by_index);
+            match part.damage.take() {
+                Some(error @ LogError::Read { .. }) => return Err(error.into()),
+                damage => read.damaged.extend(damage),
+            }
+            done = done.saturating_add(block.stored_size());
+            observer.tell(Work::Read, done, total);
+            Ok(())
         })
     }
-}
-
-fn message<'a>(file: &LogFile, block: &chunk::Block<'_>, body: &'a [u8]) -> Result<Message<'a>, LogError> {
-    let header: MessageHeader =
-        parse(body).map_err(|problem| file.damaged(block.offset(), format!("a message: {problem}")))?;
-    Ok(Message {
-        channel_id: header.channel_id,
-        sequence: header.sequence,
-        log_time: header.log_time,
-        publish_time: header.publish_time,
-        data: body.get(MESSAGE_HEADER_LEN..).unwrap_or_default(),
-    })
 }
 
 #[cfg(test)]
@@ -125,11 +184,14 @@ mod tests {
 
     fn times(log: &Log, channel: u16) -> Result<Vec<u64>, LogError> {
         let mut times = Vec::new();
-        log.for_each_message(&[channel].into(), |message| {
+        let read = log.for_each_message(&[channel].into(), |message| {
             times.push(message.log_time / 1_000_000_000);
             Ok::<_, LogError>(())
-        })?;
-        Ok(times)
+        });
+        match read.unwrap().damaged.pop() {
+            Some(error) => Err(error),
+            None => Ok(times),
+        }
     }
 
     #[test]
@@ -157,7 +219,7 @@ mod tests {
         fs::write(&path, &bytes).unwrap();
         let log = Log::open(&path).unwrap();
         match times(&log, 1) {
-            Err(LogError::Damaged { offset: at, what, .. }) => {
+            Err(LogError::BadChunk { offset: at, what, .. }) => {
                 assert_eq!(at, offset);
                 assert!(what.contains("CRC"), "{what}");
             }

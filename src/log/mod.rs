@@ -27,6 +27,7 @@
 
 mod addition;
 mod append;
+mod by_index;
 mod chunk;
 mod contents;
 #[cfg(test)]
@@ -43,13 +44,16 @@ mod file;
 mod fixture;
 mod gaps;
 mod ids;
+mod in_order;
 mod index;
 mod interrupt;
 mod messages;
 mod new_file;
 mod old_tail;
 mod open;
+mod options;
 mod output;
+mod part;
 mod rescue;
 mod restore;
 mod summary;
@@ -67,9 +71,10 @@ pub use excerpt::Excerpt;
 pub use index::{Index, LeftOut, Schema};
 pub use interrupt::{INTERRUPTION, Interruption};
 pub use mcap::records::{AttachmentIndex, Channel, ChunkIndex, MetadataIndex, Statistics};
-pub use messages::{Message, OwnedMessage};
+pub use messages::{Message, MessagesRead, OwnedMessage, bad_chunks, passed_over};
 pub use new_file::write_new;
 pub use open::Log;
+pub use options::{Observer, Progress, ReadOptions, Work};
 pub use output::Destination;
 pub use restore::{Addition, restore_pending_to};
 pub use times::TimesRead;

@@ -6,10 +6,10 @@ use mcap::records::{Header, MetadataIndex, op};
 
 use super::damage::{Damage, Damages};
 use super::ending::{self, DATA_END_LEN, Ending, MAGIC, MAGIC_LEN};
-use super::file::{HEAD_LEN, Head, LogFile, MEMORY_LIMIT};
+use super::file::{HEAD_LEN, Head, LogFile};
 use super::index::{SummaryRecord, read_record};
 use super::visibility::Visibility;
-use super::{Index, LogError, chunk, output, survey, undo};
+use super::{Index, LogError, ReadOptions, chunk, output, survey, undo};
 
 /// A recording, open for reading.
 #[derive(Debug)]
@@ -33,15 +33,15 @@ impl Log {
     /// be read takes more than 1 GiB; [`LogError::Pending`] when a run that added to it was cut off,
     /// [`LogError::InUse`] while one goes on.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, LogError> {
-        Self::open_within(path, MEMORY_LIMIT)
+        Self::open_with(path, ReadOptions::default())
     }
 
-    /// [`Log::open`] for a log of which one record or one chunk may take `memory_limit` bytes.
+    /// Opens a log that is to be read as `options` say: see [`Log::open`].
     ///
     /// # Errors
     /// As [`Log::open`].
-    pub fn open_within(path: impl AsRef<Path>, memory_limit: u64) -> Result<Self, LogError> {
-        Self::of(LogFile::open(path.as_ref(), memory_limit)?)
+    pub fn open_with(path: impl AsRef<Path>, options: ReadOptions) -> Result<Self, LogError> {
+        Self::of(LogFile::open(path.as_ref(), options)?)
     }
 
     /// Opens a log to add to it in place: see [`super::Destination::InPlace`]. Until it is dropped nobody else
@@ -50,7 +50,15 @@ impl Log {
     /// # Errors
     /// As [`Log::open`]; [`LogError::NotInPlace`] for a log that can't be written or locked.
     pub fn open_in_place(path: impl AsRef<Path>) -> Result<Self, LogError> {
-        let file = LogFile::open_exclusive(path.as_ref(), MEMORY_LIMIT)?;
+        Self::open_in_place_with(path, ReadOptions::default())
+    }
+
+    /// Opens a log to add to it in place, and reads it as `options` say.
+    ///
+    /// # Errors
+    /// As [`Log::open_in_place`].
+    pub fn open_in_place_with(path: impl AsRef<Path>, options: ReadOptions) -> Result<Self, LogError> {
+        let file = LogFile::open_exclusive(path.as_ref(), options)?;
         undo::refuse_pending(path.as_ref())?;
         Self::of(file)
     }

@@ -13,7 +13,7 @@ use super::file::{At, LogFile};
 use super::interrupt::{self, Writing};
 use super::new_file::{check_name, publish, readable_by_the_same, temporary_beside};
 use super::undo::Undo;
-use super::{Log, LogError};
+use super::{Log, LogError, Work};
 
 /// So much is copied before somebody who wants it to end is heard. A multiple of any file system's block, so
 /// that blocks can be shared.
@@ -229,6 +229,7 @@ pub(super) fn copy_start(log: &LogFile, len: u64, file: &mut File, out: &Path) -
             return Err(log.damaged(copied, what));
         }
         copied += piece;
+        log.options.observer.tell(Work::Copy, copied, len);
     }
     Ok(())
 }

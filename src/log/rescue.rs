@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use mcap::records::{ChunkIndex, MessageHeader, MessageIndex, MessageIndexEntry, op};
 
-use super::chunk::{self, Block};
+use super::chunk::{self, Block, Scratch};
 use super::file::{LogFile, parse};
 use super::{Index, LogError};
 
@@ -23,7 +23,7 @@ pub(super) fn lost_message_indexes(
 ) -> Result<Option<(ChunkIndex, Vec<MessageIndex>)>, LogError> {
     let Some(TornChunk { whole }) = &index.torn_chunk else { return Ok(None) };
     let mut buf = Vec::new();
-    chunk::read_block(file, &Block::Chunk(whole), &mut buf)?;
+    chunk::read_block(file, &Block::Chunk(whole), &mut Scratch::default(), &mut buf)?;
     let mut lost: BTreeMap<u16, Vec<MessageIndexEntry>> = BTreeMap::new();
     let mut offset = 0;
     for record in chunk::records(&buf).map_while(Result::ok) {
@@ -46,7 +46,7 @@ pub(super) fn lost_message_indexes(
 pub(super) fn left_of_cut_chunk(file: &LogFile, index: &Index) -> Result<Vec<u8>, LogError> {
     let mut buf = Vec::new();
     if let Some(cut) = &index.cut_chunk {
-        chunk::read_block(file, &Block::Cut(cut), &mut buf)?;
+        chunk::read_block(file, &Block::Cut(cut), &mut Scratch::default(), &mut buf)?;
     }
     Ok(buf)
 }

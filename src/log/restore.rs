@@ -5,12 +5,12 @@ use std::path::Path;
 
 use mcap::records::op;
 
-use super::file::{At, LogFile, MEMORY_LIMIT};
+use super::file::{At, LogFile};
 use super::interrupt::Writing;
 use super::new_file::{check_name, publish, readable_by_the_same, temporary_beside};
 use super::output::{check_output, copy_behind, copy_start, ensure_in_place, is_same_file};
 use super::undo::{self, Undo, for_each_piece};
-use super::{Log, LogError, old_tail};
+use super::{Log, LogError, ReadOptions, old_tail};
 
 /// What the metadata record of an addition is called.
 const METADATA: &str = "trackfuse:";
@@ -158,7 +158,7 @@ impl Log {
 /// [`LogError::InUse`] while that run goes on; [`LogError::BadUndo`]; errors of [`super::write_new`].
 pub fn restore_pending_to(path: &Path, out: &Path, force: bool) -> Result<Option<u64>, LogError> {
     let Some(pending) = undo::pending(path) else { return Ok(None) };
-    let log = LogFile::open_shared(path, MEMORY_LIMIT)?;
+    let log = LogFile::open_shared(path, ReadOptions::default())?;
     if is_same_file(&log.file, path, out) {
         return Err(LogError::OutputIsInput { path: out.to_owned() });
     }

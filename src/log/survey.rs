@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 
 use mcap::records::{Channel, ChunkIndex, Statistics, op};
 
-use super::chunk::{self, Block};
+use super::chunk::{self, Block, Scratch};
 use super::contents::{self, Closed, Contents, look_into};
 use super::damage::Damages;
 use super::extents;
@@ -60,7 +60,16 @@ pub(super) fn complete(
     index.metadata.sort_by_key(|metadata| metadata.offset);
     tear(index);
 
-    let mut survey = Survey { file, index, damages, unnamed, hidden: loose, closed: false, buf: Vec::new() };
+    let mut survey = Survey {
+        file,
+        index,
+        damages,
+        unnamed,
+        hidden: loose,
+        closed: false,
+        scratch: Scratch::default(),
+        buf: Vec::new(),
+    };
     let miscounted = survey.miscounted_records();
     let distrusted = contradicted || miscounted || survey.index.summary_distrusted;
     let scanned = distrusted || !is_complete(survey.index);
@@ -149,6 +158,7 @@ struct Survey<'a> {
     hidden: Option<u64>,
     /// Whether a chunk couldn't be looked into that may be whole.
     closed: bool,
+    scratch: Scratch,
     buf: Vec<u8>,
 }
 
@@ -203,7 +213,7 @@ impl Survey<'_> {
 
     /// Looks into one part, and takes it out of the index where it can't be decoded.
     fn look(&mut self, block: &Block<'_>) -> Result<Option<Contents>, LogError> {
-        let looked = look_into(self.file, block, &mut self.buf)?;
+        let looked = look_into(self.file, block, &mut self.scratch, &mut self.buf)?;
         let offset = block.offset();
         if let Block::Cut(_) = block {
             self.saved(&looked);

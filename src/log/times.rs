@@ -7,8 +7,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use mcap::records::{ChunkIndex, op};
 
-use super::chunk::{self, Block};
+use super::chunk::{self, Block, Scratch};
 use super::file::{LogFile, parse};
+use super::part::{Part, Wanted};
 use super::{Log, LogError};
 
 /// What was found beside the times.
@@ -57,15 +58,16 @@ impl Log {
             read.unread = unindexed.len();
             return read;
         }
+        let (mut part, mut scratch) = (Part::default(), Scratch::default());
         for block in unindexed {
             read.opened += 1;
             let mut times: BTreeMap<u16, Vec<u64>> = BTreeMap::new();
-            let done = self.for_each_message_of([block], |message| {
+            part.read(&self.file, &block, Wanted { channels: None, by_index: false }, &mut scratch);
+            for message in part.messages() {
                 times.entry(message.channel_id).or_default().push(message.log_time);
-                Ok::<_, LogError>(())
-            });
+            }
             times.iter().for_each(|(id, times)| f(*id, times));
-            read.damaged.extend(done.err());
+            read.damaged.extend(part.damage.take());
         }
         read
     }
@@ -92,7 +94,11 @@ pub(super) fn message_index(
         return false;
     }
     let records = chunk::records(buf).map_while(Result::ok).filter(|r| r.opcode == op::MESSAGE_INDEX);
-    let Some(channels) = records.map(|record| entries(record.body)).collect::<Option<Vec<_>>>() else {
+    let times = |(id, entries): (u16, Vec<(u64, u64)>)| {
+        (id, entries.into_iter().map(|(_, time)| time).collect::<Vec<u64>>())
+    };
+    let channels = records.map(|record| entries(record.body).map(times));
+    let Some(channels) = channels.collect::<Option<Vec<_>>>() else {
         return false;
     };
     let found: BTreeSet<u16> = channels.iter().map(|(id, _)| *id).collect();
@@ -103,8 +109,9 @@ pub(super) fn message_index(
     true
 }
 
-/// A message index's channel, and its messages' times in the order in which they stand in the chunk.
-fn entries(body: &[u8]) -> Option<(u16, Vec<u64>)> {
+/// A message index's channel, and the place and the time of its messages in the order in which they stand in the
+/// chunk.
+pub(super) fn entries(body: &[u8]) -> Option<(u16, Vec<(u64, u64)>)> {
     let (id, len) = parse::<(u16, u32)>(body).ok()?;
     let (entries, []) = body.get(6..)?.get(..len as usize)?.as_chunks::<16>() else { return None };
     let number = |bytes: &[u8]| bytes.try_into().map(u64::from_le_bytes).unwrap_or_default();
@@ -113,7 +120,7 @@ fn entries(body: &[u8]) -> Option<(u16, Vec<u64>)> {
     if !entries.is_sorted() {
         entries.sort_unstable();
     }
-    Some((id, entries.into_iter().map(|(_, time)| time).collect()))
+    Some((id, entries))
 }
 
 #[cfg(test)]
@@ -164,14 +171,14 @@ mod tests {
         let entry = |time: u64, offset: u64| [time.to_le_bytes(), offset.to_le_bytes()].concat();
         let entries_of = [entry(5, 70), entry(6, 30), entry(9, 50)].concat();
         let body = [&[2, 0, 48, 0, 0, 0][..], &entries_of].concat();
-        assert_eq!(entries(&body), Some((2, vec![6, 9, 5])));
+        assert_eq!(entries(&body), Some((2, vec![(30, 6), (50, 9), (70, 5)])));
     }
 
     #[test]
     fn an_index_that_is_no_index_counts_as_none() {
         assert_eq!(
             entries(&[1, 0, 16, 0, 0, 0, 7, 0, 0, 0, 0, 0, 0, 0, 3, 0, 0, 0, 0, 0, 0, 0]),
-            Some((1, vec![7]))
+            Some((1, vec![(3, 7)]))
         );
         assert_eq!(entries(&[1, 0, 15, 0, 0, 0, 7, 0, 0, 0, 0, 0, 0, 0, 3, 0, 0, 0, 0, 0, 0]), None);
         assert_eq!(entries(&[1, 0, 255, 255, 255, 255]), None);

@@ -20,10 +20,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::LogError;
 use super::disk;
-use super::file::{At, LogFile, MEMORY_LIMIT};
+use super::file::{At, LogFile};
 use super::new_file::{create_new, readable_by_the_same};
+use super::{LogError, ReadOptions};
 
 const LINE: &[u8] =
     b"trackfuse undo 1: the end of the log beside this, as it was. `trackfuse restore LOG` puts it back.\n";
@@ -182,7 +182,7 @@ pub fn put_back(path: &Path) -> Result<Option<u64>, LogError> {
         sweep(path);
         return Ok(None);
     };
-    let log = LogFile::open_exclusive(path, MEMORY_LIMIT)?;
+    let log = LogFile::open_exclusive(path, ReadOptions::default())?;
     // the other run may have ended meanwhile
     if fs::symlink_metadata(&pending).is_err() {
         return Ok(None);
@@ -196,7 +196,7 @@ pub fn put_back(path: &Path) -> Result<Option<u64>, LogError> {
 fn sweep(path: &Path) {
     let Ok(undo) = beside(path) else { return };
     let part = disk::with_suffix(&undo, "-part");
-    if fs::symlink_metadata(&part).is_ok() && LogFile::open_exclusive(path, MEMORY_LIMIT).is_ok() {
+    if fs::symlink_metadata(&part).is_ok() && LogFile::open_exclusive(path, ReadOptions::default()).is_ok() {
         let _ = disk::remove(&part);
     }
 }

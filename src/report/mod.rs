@@ -46,6 +46,9 @@ pub struct Report {
     pub t0_ns: String,
     /// The sources, in the order of their bits.
     pub sources: Vec<SourceReport>,
+    /// Chunks of which only the sources' messages were read, where the message index says that they stand: their
+    /// checksums, which span the whole chunk, were not checked.
+    pub unchecked_chunks: usize,
     /// Topics that hold a position or velocity, but were not used.
     pub unused_topics: Vec<String>,
     /// How the track was made.
@@ -244,8 +247,12 @@ pub struct Parts<'a> {
     pub output: &'a str,
     /// T0.
     pub t0: Time,
-    /// The sources.
+    /// The sources, whose samples may have been moved to [`Parts::sources`].
     pub loaded: &'a [Loaded],
+    /// Their samples, in the same order.
+    pub sources: &'a [Source],
+    /// How many chunks were read by message index.
+    pub unchecked_chunks: usize,
     /// Which of them is the datum.
     pub datum: usize,
     /// Channels that were passed over.
@@ -264,11 +271,13 @@ impl Report {
     /// Puts a report together.
     #[must_use]
     pub fn new(parts: &Parts<'_>) -> Self {
-        let Parts { input, output, t0, loaded, datum, unused, plan, fusion, notes, warnings } = *parts;
+        let Parts {
+            input, output, t0, loaded, sources, datum, unused, plan, fusion, notes, warnings, ..
+        } = *parts;
         let since_t0 = |s: f64| plan.origin.plus_seconds(s).seconds_since(t0);
         let span = |(a, b): (f64, f64)| (since_t0(a), since_t0(b));
         let known = |sigma: f64| Some(sigma).filter(|s| s.is_finite());
-        let name = |i: usize| loaded[i].source.name.clone();
+        let name = |i: usize| sources[i].name.clone();
         let points = &fusion.track.points;
         let carried = fusion.phases.iter().find(|p| p.phase == Phase::Extrapolated);
         let carried_s = carried.map_or(0.0, |p| p.span_s.1 - fusion.pieces.last().map_or(0.0, |p| p.1));
@@ -280,9 +289,11 @@ impl Report {
             t0_ns: t0.ns().to_string(),
             sources: loaded
                 .iter()
+                .zip(sources)
                 .enumerate()
-                .map(|(i, l)| SourceReport::new(l, i == datum, l.source.span_s().map(span)))
+                .map(|(i, (l, source))| SourceReport::new(l, source, i == datum, source.span_s().map(span)))
                 .collect(),
+            unchecked_chunks: parts.unchecked_chunks,
             unused_topics: unused.iter().map(|c| c.topic.clone()).collect(),
             track: TrackReport {
                 method: plan.method.method().name().into(),
@@ -309,7 +320,7 @@ impl Report {
                 })
                 .collect(),
             registration: fusion.registered.as_ref().map(|found| {
-                let sources: Vec<&Source> = loaded.iter().map(|l| &l.source).collect();
+                let sources: Vec<&Source> = sources.iter().collect();
                 RegistrationReport::new(found, &sources, since_t0)
             }),
             disagreements: fusion
@@ -389,17 +400,17 @@ impl LawReport {
 }
 
 impl SourceReport {
-    fn new(loaded: &Loaded, datum: bool, span_s: Option<(f64, f64)>) -> Self {
+    fn new(loaded: &Loaded, source: &Source, datum: bool, span_s: Option<(f64, f64)>) -> Self {
         let [position, velocity] = loaded.sigma;
         Self {
-            name: loaded.source.name.clone(),
+            name: source.name.clone(),
             datum,
             position: loaded.config.position.clone(),
             velocity: loaded.config.velocity.clone(),
             frame_id: loaded.frame_id.clone(),
-            positions: loaded.source.positions.len(),
-            velocities: loaded.source.velocities.len(),
-            rate_hz: coverage::median_interval_s(&loaded.source).map(f64::recip),
+            positions: source.positions.len(),
+            velocities: source.velocities.len(),
+            rate_hz: coverage::median_interval_s(source).map(f64::recip),
             span_s,
             clock: loaded.timing.clock.clone(),
             delay_s: loaded.timing.delay_s,

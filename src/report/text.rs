@@ -140,6 +140,13 @@ fn sources(out: &mut String, report: &Report) -> fmt::Result {
     if report.sources.len() == 1 {
         writeln!(out, "one source only: it is smoothed and carried on, and nothing checks it")?;
     }
+    if report.unchecked_chunks > 0 {
+        let chunks = report.unchecked_chunks;
+        writeln!(
+            out,
+            "not checked: the checksums of {chunks} uncompressed chunks, read by message index (--check-chunks checks)"
+        )?;
+    }
     if !report.unused_topics.is_empty() {
         let topics: Vec<_> = report.unused_topics.iter().map(|t| printable(t)).collect();
         writeln!(out, "not used: {}", topics.join(", "))?;

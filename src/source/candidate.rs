@@ -57,6 +57,9 @@ pub enum Unfit {
     /// It has no messages.
     #[error("no messages")]
     Silent,
+    /// No message of it was found, and parts of the log can't be read.
+    #[error("no message of it can be read: parts of the log can't be")]
+    Unreadable,
     /// Its messages hold no vector where one is looked for; the names of their first fields.
     #[error("no position or velocity in {0}")]
     NoVector(String),
@@ -116,7 +119,8 @@ pub fn judge(log: &Log, prefix: &str) -> Judgement {
     let (first, damaged) = log.first_messages(&decoders.keys().copied().collect::<BTreeSet<_>>());
     for (id, decoder) in decoders {
         let verdict = match first.get(&id).map(|message| decoder.decode(&message.data)) {
-            None => Err(Unfit::Silent),
+            None if damaged.is_empty() => Err(Unfit::Silent),
+            None => Err(Unfit::Unreadable),
             Some(Err(error)) => Err(Unfit::Undecodable(error.to_string())),
             Some(Ok(value)) => fit(&index.channels[&id].topic, &value),
         };

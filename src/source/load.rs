@@ -6,7 +6,7 @@ use super::gathered::Gathered;
 use super::reading::Reader;
 use super::{SourceError, is_datum_like};
 use crate::config::SourceConfig;
-use crate::log::{Index, Log, Message};
+use crate::log::{Index, Log, Message, MessagesRead, passed_over};
 use crate::sample::Source;
 use crate::time::Time;
 
@@ -66,35 +66,54 @@ pub struct Loaded {
     pub warnings: Vec<String>,
 }
 
-/// Loads `configs` in one pass over the log; the origin of the samples' seconds is the median time of the
-/// [`datum`]'s.
+/// The sources of a log, and how they were read.
+#[derive(Debug)]
+pub struct Samples {
+    /// The sources.
+    pub loaded: Vec<Loaded>,
+    /// What the samples' seconds count from: the median time of the [`datum`]'s.
+    pub origin: Time,
+    /// What is left out of them, a sentence each.
+    pub left_out: Vec<String>,
+    /// How the log was read.
+    pub read: MessagesRead,
+}
+
+/// Loads `configs` in one pass over the log.
 ///
 /// What gives nothing at all is an error where the user `named` the sources, and else left out while
-/// something remains: the third part of the answer has a sentence on each.
+/// something remains. Damaged parts of the log are left out.
 ///
 /// # Errors
 /// [`SourceError`] for a path or topic that doesn't fit, and for a source without a single sample.
-pub fn load(
-    log: &Log,
-    configs: &[SourceConfig],
-    named: bool,
-) -> Result<(Vec<Loaded>, Time, Vec<String>), SourceError> {
+pub fn load(log: &Log, configs: &[SourceConfig], named: bool) -> Result<Samples, SourceError> {
     let mut gathered = configs.iter().map(Gathered::new).collect::<Result<Vec<_>, _>>()?;
     let mut readers = Readers::default();
     for (i, source) in gathered.iter().enumerate() {
         readers.add(log.index(), i, source)?;
     }
-    log.for_each_message(&readers.channels(), |message| {
+    let read = log.for_each_message(&readers.channels(), |message| {
         readers.read(&message, &mut gathered);
         Ok::<(), SourceError>(())
     })?;
-    let (mut dropped, mut first_error) = (Vec::new(), None);
+    let (mut left_out, mut first_error) = (passed_over(&read.damaged), None);
     for source in &mut gathered {
         while let Some((quantity, error)) = source.lack() {
+            let error = match (error, read.damaged.first()) {
+                (SourceError::Empty { name, topic }, Some(first)) if source.messages == 0 => {
+                    SourceError::Unreadable {
+                        name,
+                        topic,
+                        parts: read.damaged.len(),
+                        first: first.to_string(),
+                    }
+                }
+                (error, _) => error,
+            };
             if named {
                 return Err(error);
             }
-            dropped.push(format!("{} is left out: {error}", source.drop(quantity)));
+            left_out.push(format!("{} is left out: {error}", source.drop(quantity)));
             first_error.get_or_insert(error);
         }
     }
@@ -104,7 +123,8 @@ pub fn load(
     }
     let kept: Vec<SourceConfig> = gathered.iter().map(|g| g.config.clone()).collect();
     let origin = gathered.get(datum(&kept)).map_or(Time::from_ns(0), Gathered::median_time);
-    Ok((gathered.into_iter().map(|g| g.finish(origin)).collect(), origin, dropped))
+    let loaded = gathered.into_iter().map(|g| g.finish(origin)).collect();
+    Ok(Samples { loaded, origin, left_out, read })
 }
 
 /// Who reads the messages of which channel.

@@ -16,7 +16,7 @@ mod topic;
 
 pub use candidate::{Candidate, Judged, Judgement, Unfit, judge};
 pub use glimpse::{Glimpse, glimpse};
-pub use load::{Loaded, SigmaOrigin, Timing, datum, load};
+pub use load::{Loaded, Samples, SigmaOrigin, Timing, datum, load};
 pub use propose::{Proposal, propose};
 pub use recognise::{Choice, Recognised, choices_of, recognise};
 pub use recorded::{Recorded, recorded, reference};
@@ -84,6 +84,20 @@ pub enum SourceError {
         topic: String,
         /// The topics that the log has.
         topics: Vec<String>,
+    },
+    /// Nothing of a topic can be read, since the log is damaged where it stands.
+    #[error(
+        "source {name:?}: no message of topic {topic:?} can be read; {parts} parts of the log can't: {first}"
+    )]
+    Unreadable {
+        /// The source.
+        name: String,
+        /// The topic.
+        topic: String,
+        /// How many parts of the log can't be read.
+        parts: usize,
+        /// What is wrong with the first of them.
+        first: String,
     },
     /// A channel can't be decoded.
     #[error("source {name:?}: topic {topic:?}: {error}")]
@@ -228,7 +242,11 @@ impl SourceError {
     pub fn is_usage(&self) -> bool {
         match self {
             Self::NoVector { fits, .. } => !fits.is_empty(),
-            Self::Log(_) | Self::Empty { .. } | Self::NoTime { .. } | Self::OneInstant { .. } => false,
+            Self::Log(_)
+            | Self::Unreadable { .. }
+            | Self::Empty { .. }
+            | Self::NoTime { .. }
+            | Self::OneInstant { .. } => false,
             _ => true,
         }
     }

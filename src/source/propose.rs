@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 
 use super::{
-    Ambiguity, Candidate, Recognised, SourceError, choices_of, datum, glimpse, is_datum_like, load, recognise,
+    Ambiguity, Candidate, Recognised, Samples, SourceError, choices_of, datum, glimpse, is_datum_like, load,
+    recognise,
 };
 use crate::config::{SourceConfig, SourceTable};
 use crate::log::Log;
@@ -81,7 +82,7 @@ fn kept(log: &Log, sources: &[SourceConfig]) -> Result<(Vec<SourceConfig>, Vec<S
     if excerpt.damaged.is_empty() && glimpses.iter().all(|g| g.lacks.is_empty()) {
         return Ok((sources.to_vec(), Vec::new()));
     }
-    let (loaded, _, left_out) = load(log, sources, false)?;
+    let Samples { loaded, left_out, .. } = load(log, sources, false)?;
     let mut kept: Vec<SourceConfig> = loaded.into_iter().map(|l| l.config).collect();
     let datum = datum(&kept);
     if let Some(source) = kept.get_mut(datum) {

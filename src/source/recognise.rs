@@ -3,11 +3,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::candidate::{Candidate, Judgement, judge};
+use super::candidate::{Candidate, Judged, Judgement, judge};
 use super::topic::{is_datum_like, is_reference, sensor_word};
 use super::{Ambiguity, SourceError, Unfit};
 use crate::config::SourceConfig;
-use crate::log::Log;
+use crate::log::{Log, bad_chunks, passed_over};
 use crate::printable::printable;
 
 /// What a log's topics say.
@@ -19,6 +19,8 @@ pub struct Recognised {
     pub unused: Vec<Candidate>,
     /// Sensors that can't be read, a sentence each.
     pub warnings: Vec<String>,
+    /// Where chunks begin that can't be decoded, as far as they were met.
+    pub bad_chunks: BTreeSet<u64>,
 }
 
 /// A source as a person may choose it: of several paths one.
@@ -34,18 +36,30 @@ pub struct Choice {
 
 /// Recognises the sources of a log.
 ///
-/// Channels whose topics begin with `prefix`, and those that this program wrote, are passed over.
+/// Channels whose topics begin with `prefix`, and those that this program wrote, are passed over, and so are parts of
+/// the log that are damaged.
 ///
 /// # Errors
 /// [`SourceError::Unrecognised`] where no topic holds a sensor's word, [`SourceError::Ambiguous`] where
 /// several channels offer the same for one sensor, or several sensors could be the datum;
-/// [`SourceError::Log`] where a part of the log that was looked into is damaged.
+/// [`SourceError::Log`] instead where a part of the log that was looked into is damaged, and where nothing can be read
+/// of a sensor: without it another would become the datum.
 pub fn recognise(log: &Log, prefix: &str) -> Result<Recognised, SourceError> {
     let mut judgement = judge(log, prefix);
-    if !judgement.damaged.is_empty() {
-        return Err(judgement.damaged.swap_remove(0).into());
+    let lost = |channel: &Judged| {
+        let topic = &channel.topic;
+        channel.verdict == Err(Unfit::Unreadable) && sensor_word(topic).is_some() && !is_reference(topic)
+    };
+    match judgement.sources() {
+        Ok(mut recognised) if !judgement.channels.iter().any(lost) => {
+            recognised.warnings.splice(..0, passed_over(&judgement.damaged));
+            recognised.bad_chunks = bad_chunks(&judgement.damaged);
+            Ok(recognised)
+        }
+        // What was not found may be what can't be read.
+        _ if !judgement.damaged.is_empty() => Err(judgement.damaged.swap_remove(0).into()),
+        other => other,
     }
-    judgement.sources()
 }
 
 /// Candidates as a config would name them: each by its topic's first part, and a number where that is taken.
@@ -123,7 +137,7 @@ impl Judgement {
             })
             .map(|(topic, why)| format!("{} looks like a sensor's and is not used: {why}", printable(topic)))
             .collect();
-        Ok(Recognised { sources, unused, warnings })
+        Ok(Recognised { sources, unused, warnings, bad_chunks: BTreeSet::new() })
     }
 }
 

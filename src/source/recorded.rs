@@ -6,11 +6,11 @@ use serde::Deserialize;
 
 use super::SourceError;
 use super::candidate::of_topic;
-use super::load::{Loaded, load};
+use super::load::{Loaded, Samples, load};
 use crate::config::{SourceConfig, TimeChoice};
 use crate::estimate::coverage::{interpolate, max_gap_s};
 use crate::log::decode::{MessagePath, Step};
-use crate::log::{Log, LogError};
+use crate::log::{Log, LogError, passed_over};
 use crate::sample::Sample;
 use crate::time::Time;
 use crate::track::{Method, Phase, State, Track, TrackPoint};
@@ -94,8 +94,9 @@ pub fn reference(
             }
         }
     }
-    let (mut loaded, origin, _) = load(log, &[config], true)?;
-    let one = loaded.pop().ok_or(SourceError::Empty { name, topic: given.join(", ") })?;
+    let Samples { mut loaded, origin, left_out, .. } = load(log, &[config], true)?;
+    let mut one = loaded.pop().ok_or(SourceError::Empty { name, topic: given.join(", ") })?;
+    one.warnings.splice(..0, left_out);
     Ok((one, origin))
 }
 
@@ -155,7 +156,7 @@ fn own_track(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
     let mut names = Names::default();
     let mut track = Track { frame_id: String::new(), points: Vec::new() };
     let (mut unreadable, mut reason) = (0_usize, String::new());
-    log.for_each_message(&channels, |message| {
+    let read = log.for_each_message(&channels, |message| {
         let read = serde_json::from_slice::<PointMessage>(message.data).map_err(|e| e.to_string());
         match read.and_then(|point| names.point(point, &mut track.frame_id)) {
             Ok(point) => track.points.push(point),
@@ -168,9 +169,13 @@ fn own_track(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
     })?;
     track.points.sort_by_key(|p| p.time);
     if track.points.is_empty() {
+        if let Some(first) = read.damaged.first() {
+            let (name, topic, parts) = (topic.to_owned(), topic.to_owned(), read.damaged.len());
+            return Err(SourceError::Unreadable { name, topic, parts, first: first.to_string() });
+        }
         return Err(SourceError::Empty { name: topic.to_owned(), topic: topic.to_owned() });
     }
-    let mut warnings = Vec::new();
+    let mut warnings = passed_over(&read.damaged);
     if unreadable > 0 {
         warnings.push(format!("{unreadable} messages of {topic} are left out: {reason}"));
     }

@@ -3,7 +3,7 @@
 
 use std::{fs, path::PathBuf};
 
-use trackfuse::log::{Appender, Compression, Destination, Log, LogError, NewMessage};
+use trackfuse::log::{Appender, Compression, Destination, Log, LogError, NewMessage, ReadOptions};
 
 use super::new_channel;
 use super::raw::told_by_stream;
@@ -136,7 +136,7 @@ fn the_crate_unpacks_a_bomb_and_this_stops_at_what_the_chunk_claims() {
     let honest = log_of(&[channel(1, 0, b"/a"), message(1, 1), chunk(1 << 30, b"zstd", &packed)]);
     let path = log.dir.path().join("in.mcap");
     fs::write(&path, honest).unwrap();
-    let log = Log::open_within(&path, 1 << 20).unwrap();
+    let log = Log::open_with(&path, ReadOptions { memory_limit: 1 << 20, ..ReadOptions::default() }).unwrap();
     assert!(log.damage()[0].what.contains("more than the limit of 1048576"), "{:?}", log.damage());
     if let Some((before, after)) = before.zip(peak_memory()) {
         assert!(after < before + (300 << 20), "{} MB", (after - before) >> 20);

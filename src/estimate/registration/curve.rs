@@ -18,8 +18,8 @@ pub struct RegisteredCurve {
 
 impl RegisteredCurve {
     /// Lets it cover these pieces, from and to in s, in order: those of the samples at their true times.
-    pub fn cover(&mut self, pieces: Vec<(f64, f64)>) {
-        self.pieces = pieces;
+    pub fn cover(&mut self, pieces: &[(f64, f64)]) {
+        self.pieces = pieces.to_vec();
     }
 
     /// The instant nearest to `time_s` that it covers, and how far that is away, s.

@@ -61,8 +61,6 @@ pub use noise::Level;
 pub use separation::{Name, Separation, Unknown};
 pub use unknowns::{Kind, Priors, SourceErrors};
 
-use std::sync::Arc;
-
 use fit::Fit;
 use start::Guess;
 
@@ -119,7 +117,7 @@ pub struct Rejected {
 #[derive(Clone, Debug)]
 pub struct Registered {
     /// The track as the datum would see it.
-    pub curve: Arc<RegisteredCurve>,
+    pub curve: RegisteredCurve,
     /// The errors by source; all zero for the datum.
     pub errors: Vec<SourceErrors>,
     /// Their standard deviations.

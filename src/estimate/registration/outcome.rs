@@ -1,7 +1,5 @@
 //! What is to be said of a fit that has ended.
 
-use std::sync::Arc;
-
 use super::curve::RegisteredCurve;
 use super::fit::Fit;
 use super::separation::{Separation, Unknown, name_of};
@@ -71,12 +69,12 @@ impl Fit<'_> {
             log_evidence: self.log_evidence,
             iterations: self.iterations,
             converged: self.converged,
-            curve: Arc::new(RegisteredCurve {
+            curve: RegisteredCurve {
                 centre: self.references[0].centre,
                 knots: self.knots,
                 posterior,
                 pieces: pieces.to_vec(),
-            }),
+            },
         })
     }
 }

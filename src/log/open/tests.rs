@@ -243,7 +243,7 @@ fn a_chunk_indexed_twice_is_damage() {
     });
     index.chunks.push(twice);
     let mut damages = Damages::default();
-    let file = LogFile::open(&path, MEMORY_LIMIT).unwrap();
+    let file = LogFile::open(&path, ReadOptions::default()).unwrap();
     survey::complete(&file, &mut index, &mut damages).unwrap();
     assert!(damages.found[0].what.contains("indexed again"), "{damages:?}");
     assert_eq!(index.chunks, log_file.index().chunks);

@@ -7,7 +7,8 @@ use mcap::records::{
 };
 
 use super::super::LogError;
-use super::super::file::{Head, MEMORY_LIMIT, parse};
+use super::super::file::{Head, parse};
+use super::super::options::MEMORY_LIMIT;
 use super::chunk_content::OpenChunk;
 use super::content::{Content, Place};
 use super::findings::Findings;

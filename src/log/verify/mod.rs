@@ -26,8 +26,9 @@ mod tests;
 use std::path::Path;
 
 use super::LogError;
-use super::file::{LogFile, MEMORY_LIMIT};
+use super::ReadOptions;
 use super::ending::MAGIC;
+use super::file::LogFile;
 use data_section::DataSection;
 use sequence::Sequence;
 
@@ -94,7 +95,7 @@ impl Verification {
 /// [`LogError::Open`], [`LogError::Read`]; [`LogError::NotMcap`] where the file doesn't start like one.
 /// Everything else that is wrong is a [`Finding`].
 pub fn verify(path: &Path, progress: &mut Progress<'_>) -> Result<Verification, LogError> {
-    let file = LogFile::open(path, MEMORY_LIMIT)?;
+    let file = LogFile::open(path, ReadOptions::default())?;
     let mut sequence = Sequence::new(&file, progress);
     let mut start = Vec::new();
     sequence.read_into(file.len.min(MAGIC.len() as u64), &mut start)?;

@@ -3,7 +3,8 @@
 use std::io::{BufReader, Read};
 
 use super::super::LogError;
-use super::super::file::{At, HEAD_LEN, Head, LogFile, MEMORY_LIMIT, split_head};
+use super::super::file::{At, HEAD_LEN, Head, LogFile, split_head};
+use super::super::options::MEMORY_LIMIT;
 
 /// How much is read at once.
 const PIECE: u64 = 1 << 20;

@@ -5,8 +5,9 @@ use std::cell::OnceCell;
 use mcap::records::{AttachmentIndex, ChunkIndex, Footer, MetadataIndex, op};
 
 use super::super::LogError;
-use super::super::file::{HEAD_LEN, Head, LogFile, MEMORY_LIMIT, parse};
 use super::super::ending::MAGIC;
+use super::super::file::{HEAD_LEN, Head, LogFile, parse};
+use super::super::options::MEMORY_LIMIT;
 use super::against::Summary;
 use super::data_section::{DataSection, End};
 use super::sequence::{Sequence, name_of};
