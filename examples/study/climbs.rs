@@ -26,7 +26,7 @@ impl Recording {
     pub(crate) fn open(log: &Path) -> Self {
         let log = Log::open(log).expect("a log");
         let configs = source::recognise(&log, "/fused").expect("sources").sources;
-        let (loaded, origin, _) = source::load(&log, &configs, false).expect("samples");
+        let source::Samples { loaded, origin, .. } = source::load(&log, &configs, false).expect("samples");
         Self { loaded, origin }
     }
 }

@@ -50,7 +50,8 @@ pub(crate) fn judge(log: &Path) -> Flight {
     let log = Log::open(log).expect("a log");
     let config =
         SourceConfig { name: "truth".into(), position: Some(TRUTH.into()), ..SourceConfig::default() };
-    let (truth, origin, _) = source::load(&log, &[config], true).expect("the truth");
+    let source::Samples { loaded: truth, origin, .. } =
+        source::load(&log, &[config], true).expect("the truth");
     let configs: Vec<SourceConfig> = recording.loaded.iter().map(|l| l.config.clone()).collect();
     let datum = source::datum(&configs);
     let errors = [true, false].map(|by_gauge| {
