@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::config::{self, Config, ExtrapolationMethod, Registration};
 use crate::estimate::characteristic_point::Height;
 use crate::estimate::coverage;
-use crate::estimate::extrapolation::{self, Law, LawKind};
+use crate::estimate::extrapolation::{self, Choice, Law, LawKind};
 use crate::estimate::registration::{self, Kind};
 use crate::fusion::{self, Fusion, Plan};
 use crate::log::Log;
@@ -98,8 +98,7 @@ pub fn plan(
         window_points: fuse.window_points,
         bridge_max_s: fuse.bridge_max_s,
         registration,
-        extrapolation: (beyond.horizon_s > 0.0)
-            .then(|| extrapolation::Settings { laws: laws(beyond, sources), horizon_s: beyond.horizon_s }),
+        extrapolation: (beyond.horizon_s > 0.0).then(|| carrying_on(beyond, sources)),
         stop_z_m: beyond.stop_z_m,
         heights: config
             .characteristic_point
@@ -143,9 +142,9 @@ fn rate_hz(config: &Config, sources: &[Source], warnings: &mut Vec<String>) -> R
     Ok(lowered)
 }
 
-/// What the track may be carried on by. Each law is fitted to the last stretch, by default of its own length, but of
-/// at least 12 median intervals of the slowest source.
-fn laws(beyond: &config::Extrapolation, sources: &[Source]) -> Vec<Law> {
+/// What the track may be carried on by: what is asked for, then the others, for comparison. Each law is fitted to the
+/// last stretch, by default of its own length, but of at least 12 median intervals of the slowest source.
+fn carrying_on(beyond: &config::Extrapolation, sources: &[Source]) -> extrapolation::Settings {
     let slowest = sources.iter().filter_map(coverage::median_interval_s).fold(0.0, f64::max);
     let windowed = |law: Law| {
         let window_s = beyond.window_s.unwrap_or(law.window_s.max(12.0 * slowest));
@@ -154,11 +153,13 @@ fn laws(beyond: &config::Extrapolation, sources: &[Source]) -> Vec<Law> {
     let prior = beyond.prior.then_some(extrapolation::PRIOR);
     let kind = LawKind::Polynomial { order: beyond.order, prior };
     let (polynomial, drag) = (windowed(Law { kind, ..Law::POLYNOMIAL }), windowed(Law::DRAG));
-    match beyond.method {
-        ExtrapolationMethod::Pcf => vec![polynomial],
-        ExtrapolationMethod::Drag => vec![drag],
-        ExtrapolationMethod::Auto => vec![polynomial, drag],
-    }
+    let (mut laws, choice) = match beyond.method {
+        ExtrapolationMethod::Pcf => (vec![polynomial, windowed(Law::POLYNOMIAL), drag], Choice::First),
+        ExtrapolationMethod::Drag => (vec![drag, polynomial], Choice::First),
+        ExtrapolationMethod::Auto => (vec![polynomial, drag], Choice::Best),
+    };
+    laws.dedup();
+    extrapolation::Settings { laws, choice, horizon_s: beyond.horizon_s }
 }
 
 /// The datum's first sample that is in the track, which a stray stamp is not: T0.
@@ -233,4 +234,24 @@ pub fn warnings_of(loaded: &[Loaded], shift_s: Option<f64>) -> Vec<String> {
         ));
     }
     warnings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ExtrapolationMethod::{Auto, Drag, Pcf};
+    use super::*;
+
+    #[test]
+    fn the_law_that_is_asked_for_comes_first_and_others_are_tried_beside_it() {
+        let asked = |method, prior| {
+            let beyond = config::Extrapolation { method, prior, ..config::Extrapolation::default() };
+            let found = carrying_on(&beyond, &[]);
+            (found.choice, found.laws)
+        };
+        let plain = Law { kind: LawKind::Polynomial { order: 4, prior: None }, ..Law::POLYNOMIAL };
+        assert_eq!(asked(Pcf, true), (Choice::First, vec![Law::POLYNOMIAL, Law::DRAG]));
+        assert_eq!(asked(Pcf, false), (Choice::First, vec![plain, Law::POLYNOMIAL, Law::DRAG]));
+        assert_eq!(asked(Drag, true), (Choice::First, vec![Law::DRAG, Law::POLYNOMIAL]));
+        assert_eq!(asked(Auto, true), (Choice::Best, vec![Law::POLYNOMIAL, Law::DRAG]));
+    }
 }

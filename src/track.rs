@@ -21,6 +21,12 @@ pub struct State {
 }
 
 impl State {
+    /// Whether position and velocity are numbers; a sigma may be unknown.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.position.iter().chain(&self.velocity).all(|v| v.is_finite())
+    }
+
     /// The state at `share` of the way from this one to `other`, by linear interpolation.
     #[must_use]
     pub fn mixed(&self, other: &Self, share: f64) -> Self {

@@ -6,13 +6,14 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use trackfuse::estimate::EstimateError;
 use trackfuse::estimate::coverage::Coverage;
-use trackfuse::estimate::extrapolation::{self, Law, LawKind};
+use trackfuse::estimate::extrapolation::{self, Choice, Law, LawKind};
 use trackfuse::estimate::polynomial::Prior;
+use trackfuse::estimate::registration;
 use trackfuse::estimate::{Coefficients, Estimator};
 use trackfuse::fusion::{Fusion, Plan, fuse};
 use trackfuse::sample::{Quantity, Sample, Source};
 use trackfuse::time::Time;
-use trackfuse::track::TrackPoint;
+use trackfuse::track::{Phase, TrackPoint};
 
 const METHODS: [Estimator; 4] = [Estimator::Gdf, Estimator::Pcf, Estimator::Sff, Estimator::MovingAverage];
 
@@ -34,7 +35,7 @@ fn plan(method: Estimator, coefficients: Coefficients) -> Plan {
             vec![Law {
                 kind: LawKind::Polynomial { order: 4, prior: Some(Prior { sigma: 0.5, decay_s: None }) },
                 window_s: 1.4,
-            }], horizon_s: 0.5 },
+            }], choice: Choice::First, horizon_s: 0.5 },
         ),
         stop_z_m: None,
         heights: Vec::new(),
@@ -253,4 +254,50 @@ proptest! {
             }
         }
     }
+}
+
+#[test]
+fn the_extrapolation_goes_on_where_the_track_ends_with_its_band() {
+    for registration in [None, Some(registration::Settings::default())] {
+        let plan = Plan { registration, rate_hz: 1000.0, ..plan(Estimator::Sff, Coefficients::Shared) };
+        let points = fuse(&sources(0.1), &plan).expect("a good problem").track.points;
+        let first = points.iter().position(|p| p.phase == Phase::Extrapolated).expect("carried on");
+        let (a, b) = (&points[first - 1].state, &points[first].state);
+        for axis in 0..3 {
+            let step = b.position[axis] - a.position[axis] - 1e-3 * a.velocity[axis];
+            assert!(step.abs() < 1e-4, "{step} m");
+            assert!((b.velocity[axis] - a.velocity[axis]).abs() < 0.02, "{:?} {:?}", a.velocity, b.velocity);
+            let wider = b.position_sigma[axis] / a.position_sigma[axis];
+            assert!((0.99..1.05).contains(&wider), "{:?} {:?}", a.position_sigma, b.position_sigma);
+            let wider = b.velocity_sigma[axis] / a.velocity_sigma[axis];
+            assert!((0.99..1.05).contains(&wider), "{:?} {:?}", a.velocity_sigma, b.velocity_sigma);
+        }
+    }
+}
+
+#[test]
+fn velocities_that_outlast_the_positions_by_an_interval_carry_the_track_on() {
+    let mut both = sources(0.0);
+    both.truncate(1);
+    let mut velocities = both[0].clone();
+    velocities.positions.clear();
+    both[0].velocities.clear();
+    both[0].positions = both[0].positions.iter().step_by(10).copied().collect();
+    assert!(both[0].span_s().expect("positions").1 < velocities.span_s().expect("velocities").1);
+    both.push(velocities);
+    let found = run(&both, Estimator::Sff, Coefficients::Shared);
+    assert!(found.track.points.iter().any(|p| p.phase == Phase::Extrapolated), "{:?}", found.warnings);
+}
+
+#[test]
+fn a_track_that_ends_above_the_stop_is_not_carried_on() {
+    let carried = |stop_z_m| {
+        let plan = Plan { stop_z_m: Some(stop_z_m), ..plan(Estimator::Sff, Coefficients::Shared) };
+        let points = fuse(&sources(0.0), &plan).expect("a good problem").track.points;
+        points.iter().filter(|p| p.phase == Phase::Extrapolated).count()
+    };
+    let all = carried(1e9);
+    assert!((20..30).contains(&all), "a stop that is never reached stops nothing: {all}");
+    assert_eq!(carried(-40.0), 0);
+    assert!((1..all).contains(&carried(-27.0)));
 }

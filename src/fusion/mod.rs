@@ -8,26 +8,28 @@
 //! 5. Characteristic points are looked up on the track.
 
 mod bands;
+mod carried;
 mod pieces;
 mod registered;
 
 use std::sync::Arc;
 
 use bands::{Bands, Unregistered, warn_of_disagreement, warn_of_misfit};
+use carried::Carried;
 use pieces::{Piece, fit_pieces};
 use registered::register_pieces;
 
 use crate::estimate::agreement::{self, Disagreement};
 use crate::estimate::characteristic_point::{self, CharacteristicPoint, Height};
 use crate::estimate::coverage::{self, Coverage};
-use crate::estimate::extrapolation::{self, Extrapolation, Holdout, Law, LawKind};
+use crate::estimate::extrapolation::{self, Holdout, Law};
 use crate::estimate::registration::{self, Registered};
 use crate::estimate::{self, EstimateError};
 use crate::estimate::{Coefficients, Estimator};
 use crate::quality::{self, PhaseSummary, Residual};
 use crate::sample::Source;
 use crate::time::Time;
-use crate::track::{Curve, Phase, Track, TrackPoint};
+use crate::track::{Curve, Track, TrackPoint};
 
 /// What is to be done, every default resolved.
 #[derive(Clone, Debug, PartialEq)]
@@ -117,11 +119,9 @@ pub struct TriedLaw {
     pub law: Law,
     /// How it did.
     pub holdout: Holdout,
+    /// Whether it would clearly have been better than the one that was taken.
+    pub clearly_better: bool,
 }
-
-/// Order of the extrapolation that `/fused/pcf` shows, and the number of last samples it is fitted to:
-/// Zhang 2025's sea trial (order 4, samples 141 to 186).
-const PLAIN_PCF: (usize, usize) = (4, 46);
 
 /// Fuses `sources`, each in order of time.
 ///
@@ -140,8 +140,8 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
     }
     let coverage = Coverage::of(sources);
     let curve = registered.as_mut().map(|r| {
-        r.curve = r.curve.clone().over(&coverage.pieces(plan.bridge_max_s));
-        Arc::new(r.curve.clone())
+        Arc::make_mut(&mut r.curve).cover(coverage.pieces(plan.bridge_max_s));
+        Arc::clone(&r.curve)
     });
     let pieces = fit_pieces(sources, &coverage, plan, curve.as_ref(), &mut warnings)?;
 
@@ -170,42 +170,10 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
         last_s = seen.last().map_or(piece.to_s, |p| p.time.seconds_since(plan.origin));
         points.extend(seen);
     }
-    let (mut plain, mut laws) = (Vec::new(), Vec::new());
+    let mut carried = Carried::default();
     if let Some((piece, settings)) = pieces.last().zip(plan.extrapolation.as_ref()) {
-        if settings.horizon_s > piece.to_s - piece.from_s {
-            warnings.push(format!(
-                "the track is carried on {} s from {:.2} s that were seen: look at its band before you use it",
-                settings.horizon_s,
-                piece.to_s - piece.from_s
-            ));
-        }
-        let last = seeing_the_end(piece, &coverage);
-        let carried = |made: &Extrapolation| carry_on(made, piece, settings.horizon_s, last_s, &bands, plan);
-        let extrapolate = |law: Law| {
-            let span_s = (piece.from_s, piece.to_s);
-            extrapolation::extrapolate(&last, &*piece.curve, span_s, law, settings.horizon_s)
-        };
-        let as_printed = Law {
-            kind: LawKind::Polynomial { order: PLAIN_PCF.0, prior: None },
-            window_s: last_samples_s(&last, piece.to_s, PLAIN_PCF.1),
-        };
-        plain = extrapolate(as_printed).as_ref().map_or(Vec::new(), carried);
-        let (mut made, mut failed) = (Vec::new(), Vec::new());
-        for &law in &settings.laws {
-            match extrapolate(law) {
-                Ok(extrapolation) => made.push(extrapolation),
-                Err(error) => failed.push(format!("{}: {error}", law.kind.name())),
-            }
-        }
-        if made.is_empty() {
-            warnings.push(format!("the track is not extrapolated: {}", failed.join("; ")));
-        }
-        if let Some(best) = extrapolation::best(&made) {
-            points.extend(carried(best));
-            let others = made.iter().filter(|e| e.law != best.law);
-            let tried = |e: &Extrapolation| TriedLaw { law: e.law, holdout: e.holdout };
-            laws = std::iter::once(best).chain(others).map(tried).collect();
-        }
+        carried = carried::carry_on(piece, settings, last_s, &coverage, &bands, plan, &mut warnings);
+        points.append(&mut carried.points);
     }
 
     let track = Track { frame_id: plan.frame_id.clone(), points };
@@ -216,14 +184,14 @@ pub fn fuse(sources: &[Source], plan: &Plan) -> Result<Fusion, EstimateError> {
         events: events(&track, plan, &mut warnings),
         phases: quality::phases(&track, plan.origin, &residuals),
         residuals,
-        plain_pcf: Track { frame_id: plan.frame_id.clone(), points: plain },
+        plain_pcf: Track { frame_id: plan.frame_id.clone(), points: carried.plain },
         track,
         spline: pieces.last().and_then(|p| p.spline),
         pieces: pieces.iter().map(|p| (p.from_s, p.to_s)).collect(),
         coverage,
         registered,
         disagreements,
-        laws,
+        laws: carried.laws,
         warnings,
     })
 }
@@ -246,42 +214,6 @@ fn observed(piece: &Piece, coverage: &Coverage, bands: &Bands<'_>, plan: &Plan) 
     points
 }
 
-/// The points after a piece's last sample, on the grid that its last point, at `start_s`, is on.
-fn carry_on(
-    made: &Extrapolation,
-    piece: &Piece,
-    horizon_s: f64,
-    start_s: f64,
-    bands: &Bands<'_>,
-    plan: &Plan,
-) -> Vec<TrackPoint> {
-    let point = |time_s| {
-        Some(TrackPoint {
-            time: plan.origin.plus_seconds(time_s),
-            state: bands.widen(made.at(time_s)?, time_s, 0, Phase::Extrapolated),
-            phase: Phase::Extrapolated,
-            method: made.law.kind.method(),
-            seen_by: 0,
-        })
-    };
-    // up to the first point at or above the stop, so that a height at the stop is reached
-    let mut above = false;
-    let below = |p: &TrackPoint| {
-        let go_on = !above;
-        above = plan.stop_z_m.is_some_and(|stop| p.state.position[2] >= stop);
-        go_on
-    };
-    let times = grid(start_s, piece.to_s + horizon_s, plan.rate_hz).skip(1);
-    times.map_while(point).take_while(below).collect()
-}
-
-/// The sources that see a piece's last instant: one that stopped earlier may disagree with them.
-fn seeing_the_end(piece: &Piece, coverage: &Coverage) -> Vec<Source> {
-    let seen_by = coverage.seen_by(piece.to_s);
-    let sources = piece.sources.iter().enumerate().filter(|(i, _)| seen_by >> i & 1 == 1);
-    sources.map(|(_, s)| s.clone()).collect()
-}
-
 /// Characteristic points that the track reaches; a warning for each that it doesn't.
 fn events(track: &Track, plan: &Plan, warnings: &mut Vec<String>) -> Vec<CharacteristicPoint> {
     let mut events = Vec::new();
@@ -302,14 +234,6 @@ fn grid(from_s: f64, to_s: f64, rate_hz: f64) -> impl Iterator<Item = f64> {
     // a last sample that a clock offset moved by microseconds still counts
     let count = ((to_s - from_s) * rate_hz + 1e-3).floor().max(0.0) as usize;
     (0..=count).map(move |i| (from_s + i as f64 / rate_hz).min(to_s))
-}
-
-/// The length of the stretch before `to_s` that holds the last `count` sampling instants, s.
-fn last_samples_s(sources: &[Source], to_s: f64, count: usize) -> f64 {
-    let mut times: Vec<f64> = sources.iter().flat_map(|s| &s.positions).map(|p| p.time_s).collect();
-    times.sort_by(f64::total_cmp);
-    let first = times.len().saturating_sub(count);
-    times.get(first).map_or(0.0, |t| to_s - t + 1e-9) // so that rounding doesn't lose the first
 }
 
 /// Gives points without an acceleration the difference of their neighbours' velocities, as the paper does; none

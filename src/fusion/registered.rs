@@ -4,7 +4,7 @@ use super::Plan;
 use super::pieces::{instants, warn_of_lost};
 use crate::estimate::agreement::{self, Disagreement};
 use crate::estimate::coverage::Coverage;
-use crate::estimate::registration::{Kind, Registered, Separation, register};
+use crate::estimate::registration::{Kind, Name, Registered, Separation, register};
 use crate::estimate::{EstimateError, spline};
 use crate::sample::{Quantity, Source};
 use crate::track::{Curve, State};
@@ -60,6 +60,9 @@ pub(super) fn widened(mut state: State, time_s: f64, registered: &Registered) ->
 /// An unknown that keeps more than this share of its prior sigma, and can't be told from another, is worth a warning.
 const UNKNOWN: f64 = 0.5;
 
+/// A bias that is more probable than this is there.
+const LIKELY: f64 = 0.5;
+
 /// Noise this many times what was stated means that something is wrong with one or the other.
 const MISFIT: f64 = 3.0;
 
@@ -84,9 +87,26 @@ pub(super) fn warn(
                     && u.sigma > UNKNOWN * u.prior_sigma
             })
         };
+        let own = |kind: Kind| {
+            registered.unknowns.iter().filter(move |u| (u.name.source, u.name.kind) == (s, kind))
+        };
+        let clock_is_open = own(Kind::ClockOffset).any(|u| u.separation == Separation::AtPrior);
+        let together = own(Kind::Bias).any(|u| {
+            let clock = |(other, _): (Name, f64)| (other.source, other.kind) == (s, Kind::ClockOffset);
+            u.separation == Separation::OnlyTogether
+                && u.strongest.is_some_and(clock)
+                && u.probability > LIKELY
+        }) && clock_is_open;
+        if together {
+            warnings.push(format!(
+                "the data don't separate the bias of {} from its clock offset: an overlap with the datum in which \
+                 the velocity changes would; the bands hold what that leaves open",
+                source.name
+            ));
+        }
         let kinds = [Kind::Bias, Kind::ClockOffset].into_iter().filter(|kind| vague(*kind)).map(Kind::name);
         let kinds: Vec<&str> = kinds.collect();
-        if !kinds.is_empty() {
+        if !kinds.is_empty() && !together {
             warnings.push(format!(
                 "the data can't tell the {} of {}: an overlap with the datum in which the speed changes would; the \
                  bands hold what that leaves open",
@@ -119,7 +139,9 @@ pub(super) fn warn(
     }
     for (first, second) in agreement::uncompared(sources, left, Quantity::Position) {
         warnings.push(format!(
-            "{} and {} never measure position at the same time: what they differ by rests on the track between them",
+            "{} and {} never measure position at the same time: nothing shows directly what they differ by, and the \
+             registration rests on a smooth track between them; the bands hold what that leaves open, an overlap \
+             would make them narrower",
             sources[first].name, sources[second].name
         ));
     }

@@ -207,6 +207,9 @@ pub struct LawReport {
     pub holdout_lead_s: f64,
     /// How many such trials there were.
     pub holdout_trials: usize,
+    /// Whether it would clearly have been better than the one that was taken: from the same instants at least a third
+    /// less off, and by more than the track is known to.
+    pub clearly_better: bool,
 }
 
 /// A characteristic point.
@@ -355,6 +358,14 @@ impl Report {
 }
 
 impl LawReport {
+    /// How a config asks for it.
+    fn asked(&self) -> String {
+        match self.order {
+            None => "method = \"drag\"".into(),
+            Some(order) => format!("method = \"pcf\", order = {order}, prior = {}", self.prior),
+        }
+    }
+
     fn new(tried: &TriedLaw) -> Self {
         let (order, prior) = match tried.law.kind {
             LawKind::Polynomial { order, prior } => (Some(order), prior.is_some()),
@@ -370,6 +381,7 @@ impl LawReport {
             holdout_velocity_m_s: h.velocity_m_s,
             holdout_lead_s: h.lead_s,
             holdout_trials: h.trials,
+            clearly_better: tried.clearly_better,
         }
     }
 }

@@ -93,6 +93,9 @@ fn extrapolation(out: &mut String, e: &ExtrapolationReport, rate_hz: f64) -> fmt
             law.holdout_trials,
             law.holdout_lead_s
         )?;
+        if law.clearly_better {
+            write!(out, "\n        which would have been clearly better: [extrapolation] {}", law.asked())?;
+        }
     }
     writeln!(out)
 }
@@ -202,4 +205,35 @@ fn events(out: &mut String, report: &Report) -> fmt::Result {
 pub(super) fn short(v: f64) -> String {
     let text = format!("{v:.2}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::LawReport;
+
+    #[test]
+    fn a_law_that_would_clearly_have_been_better_is_named_with_what_to_ask_for() {
+        let law = |method: &str, order, clearly_better| LawReport {
+            method: method.into(),
+            order,
+            prior: order.is_some(),
+            window_s: 1.4,
+            holdout_position_m: 0.3,
+            holdout_velocity_m_s: 0.2,
+            holdout_lead_s: 0.8,
+            holdout_trials: 6,
+            clearly_better,
+        };
+        let page = |clearly_better| {
+            let laws = vec![law("pcf", Some(4), false), law("drag", None, clearly_better)];
+            let report = ExtrapolationReport { horizon_s: 2.0, length_s: 2.0, laws };
+            let mut out = String::new();
+            extrapolation(&mut out, &report, 50.0).expect("a String takes everything");
+            out
+        };
+        let said = "which would have been clearly better: [extrapolation] method = \"drag\"";
+        assert!(page(true).contains(said), "{}", page(true));
+        assert!(!page(false).contains("better"), "{}", page(false));
+    }
 }

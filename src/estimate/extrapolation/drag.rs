@@ -75,6 +75,9 @@ pub(super) fn fit(sources: &[Source], from_s: f64, end_s: f64, reach_s: f64) -> 
     let mut unknowns = start(&sources).ok_or_else(|| undetermined("there is no position"))?;
     let mut misfit = misfits(&sources, end_s, &unknowns);
     for _ in 0..MAX_STEPS {
+        if !misfit.iter().all(|m| m.is_finite()) {
+            return Err(undetermined("its motion leaves every bound"));
+        }
         let solution = linearised(&sources, end_s, &unknowns, &misfit)
             .solve()
             .ok_or_else(|| undetermined("the samples lie at too few instants"))?;
@@ -270,6 +273,14 @@ mod tests {
             assert!(state.position_sigma[2] < 0.01 + 0.2 * lead, "{}", state.position_sigma[2]);
         }
         assert!(fitted.at(1.9).is_none() && fitted.at(4.5).is_none());
+    }
+
+    #[test]
+    fn a_motion_beyond_every_number_is_an_error() {
+        let mut wild = sampled(1.0);
+        wild.velocities.iter_mut().for_each(|v| v.value = [1e9; 3]);
+        let found = fit(&[wild], 0.0, 1.0, 2.0);
+        assert!(matches!(found, Err(EstimateError::Undetermined { .. })), "{found:?}");
     }
 
     #[test]

@@ -3,7 +3,8 @@
 //! Zhang 2025 fits an order-4 PCF to the last 46 samples and carries it 100 samples on. Plain least squares
 //! does that for a moment only: the errors of its jerk and snap grow with t^3 and t^4. With a [`Prior`]
 //! that lets the acceleration die away, as that of a body in water does, it holds several times longer. The other law
-//! is that body's own: constant force and quadratic drag.
+//! is that body's own: constant force and quadratic drag. Either goes on from where the track ends without a step;
+//! the paper's plain polynomial doesn't, as in the paper.
 //!
 //! The band. What a law gets wrong is the future acceleration. Take that as white noise of density q
 //! (m^2/s^3) from the last sample on: the velocity's variance grows by q h, the position's by q h^3 / 3 at a
@@ -12,6 +13,9 @@
 //! several laws does better on this log.
 
 mod drag;
+mod transition;
+
+use transition::Transition;
 
 use super::Coefficients;
 use super::EstimateError;
@@ -23,10 +27,21 @@ use crate::track::{Curve, Method, State};
 /// What may be chosen.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// The candidates; of several the one that does better from earlier instants is taken.
+    /// The candidates.
     pub laws: Vec<Law>,
+    /// Which of them is taken.
+    pub choice: Choice,
     /// How far to go, s.
     pub horizon_s: f64,
+}
+
+/// Which of several laws is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Choice {
+    /// The first; the others are tried for comparison only.
+    First,
+    /// The one that does better from earlier instants.
+    Best,
 }
 
 /// A law of motion, and the stretch that it is fitted to.
@@ -97,6 +112,7 @@ pub struct Extrapolation {
     /// The law.
     pub law: Law,
     fitted: Box<dyn Curve>,
+    transition: Option<Transition>,
     /// The last sample's time, s.
     pub from_s: f64,
     /// Density q of the acceleration's error by axis, m^2/s^3.
@@ -116,6 +132,22 @@ pub struct Holdout {
     pub lead_s: f64,
     /// Number of trials.
     pub trials: usize,
+    /// How well the curve that they are held against is known there: its root mean square 3-D sigma, m.
+    pub known_m: f64,
+}
+
+/// A law is clearly better than another whose error is this many times its own.
+const CLEARLY: f64 = 1.5;
+
+impl Holdout {
+    /// Whether these trials show a law clearly better than the other's: from the same instants, an error at least a
+    /// third smaller, and by more than the curve is known to.
+    #[must_use]
+    pub fn clearly_better_than(&self, other: &Self) -> bool {
+        self.trials == other.trials
+            && CLEARLY * self.position_m <= other.position_m
+            && other.position_m - self.position_m > self.known_m.max(other.known_m)
+    }
 }
 
 /// A trial held against the curve at one lead.
@@ -149,6 +181,10 @@ pub fn extrapolate(
         })
     };
     let fitted = fit(to_s, horizon_s)?;
+    let plain = matches!(law.kind, LawKind::Polynomial { prior: None, .. });
+    // a curve without an acceleration of its own (GDF, the moving average) is no motion to go on from
+    let last = curve.at(to_s).filter(|s| !plain && s.acceleration.is_some());
+    let transition = last.zip(fitted.at(to_s)).map(|(last, law)| Transition::of(last, &law));
     let reach = horizon_s.min(TRIED_S).min(0.5 * (to_s - from_s));
     let mut misses = Vec::new();
     for origin in 1..=ORIGINS {
@@ -158,6 +194,7 @@ pub fn extrapolate(
                 let lead_s = (to_s - origin_s) * lead as f64 / LEADS as f64;
                 let time_s = (origin_s + lead_s).min(to_s);
                 let pair = trial.at(time_s).zip(curve.at(time_s));
+                let pair = pair.filter(|(made, truth)| made.is_finite() && truth.is_finite());
                 misses.extend(pair.map(|(made, truth)| Miss { lead_s, origin, made, truth }));
             }
         }
@@ -170,7 +207,8 @@ pub fn extrapolate(
         });
     }
     let acceleration_density = std::array::from_fn(|axis| density(&misses, axis));
-    Ok(Extrapolation { law, fitted, from_s: to_s, acceleration_density, holdout: holdout(&misses) })
+    let holdout = holdout(&misses);
+    Ok(Extrapolation { law, fitted, transition, from_s: to_s, acceleration_density, holdout })
 }
 
 /// The best of several by the trials from earlier instants: the first of those that are equally far off.
@@ -215,18 +253,28 @@ fn holdout(misses: &[Miss]) -> Holdout {
         velocity_m_s: mean(&|m| square(m.made.velocity, m.truth.velocity)).sqrt(),
         lead_s: mean(&|m| m.lead_s),
         trials: farthest.len(),
+        known_m: mean(&|m| m.truth.position_sigma.iter().map(|s| s * s).sum()).sqrt(),
+    }
+}
+
+impl Extrapolation {
+    /// Whether it goes on from the track's last state, whose uncertainty it then holds.
+    #[must_use]
+    pub fn is_joined(&self) -> bool {
+        self.transition.is_some()
     }
 }
 
 impl Curve for Extrapolation {
     fn at(&self, time_s: f64) -> Option<State> {
         let lead = time_s - self.from_s;
-        let mut state = self.fitted.at(time_s).filter(|_| lead >= 0.0)?;
+        let state = self.fitted.at(time_s).filter(|_| lead >= 0.0)?;
+        let mut state = self.transition.map_or(state, |t| t.joined(state, lead));
         for (axis, q) in self.acceleration_density.into_iter().enumerate() {
             state.position_sigma[axis] = state.position_sigma[axis].hypot((q * lead.powi(3) / 3.0).sqrt());
             state.velocity_sigma[axis] = state.velocity_sigma[axis].hypot((q * lead).sqrt());
         }
-        Some(state)
+        Some(state).filter(State::is_finite)
     }
 }
 
@@ -278,6 +326,55 @@ mod tests {
         }
         assert_eq!(found.holdout.trials, ORIGINS);
         assert!(found.holdout.position_m > 0.05, "{:?}", found.holdout);
+    }
+
+    /// A smooth curve that ends beside what its samples say.
+    struct Beside;
+
+    impl Curve for Beside {
+        fn at(&self, time_s: f64) -> Option<State> {
+            Some(State {
+                position: [0.5 * time_s * time_s + 0.07; 3],
+                velocity: [time_s - 0.4; 3],
+                acceleration: Some([30.0; 3]),
+                position_sigma: [0.05; 3],
+                velocity_sigma: [0.2; 3],
+            })
+        }
+    }
+
+    #[test]
+    fn a_law_goes_on_from_the_curves_last_state_and_band_but_the_plain_polynomial_as_printed() {
+        let sources = [source(4.0, |t| (0.5 * t * t, t))];
+        let carry = |law| extrapolate(&sources, &Beside, (0.0, 4.0), law, 2.0).expect("long enough");
+        let last = Beside.at(4.0).expect("everywhere");
+        for law in [PCF, DRAG] {
+            let first = carry(law).at(4.0).expect("its start");
+            for axis in 0..3 {
+                assert!((first.position[axis] - last.position[axis]).abs() < 1e-12);
+                assert!((first.velocity[axis] - last.velocity[axis]).abs() < 1e-12);
+            }
+            assert_eq!((first.position_sigma, first.velocity_sigma), ([0.05; 3], [0.2; 3]));
+        }
+        let far = carry(PCF).at(6.0).expect("ahead");
+        assert!((far.position[0] - 18.0).abs() < 0.01, "the law has its way: {}", far.position[0]);
+        let printed = Law { kind: LawKind::Polynomial { order: 4, prior: None }, window_s: 1.4 };
+        assert!((carry(printed).at(4.0).expect("its start").position[0] - 8.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn clearly_better_is_a_third_less_off_from_the_same_instants_beyond_what_is_known() {
+        let of = |position_m, trials| Holdout { position_m, trials, known_m: 0.05, ..Holdout::default() };
+        assert!(of(0.6, 6).clearly_better_than(&of(1.0, 6)));
+        assert!(!of(0.7, 6).clearly_better_than(&of(1.0, 6)), "not by a third");
+        assert!(!of(0.6, 5).clearly_better_than(&of(1.0, 6)), "other instants");
+        assert!(!of(0.01, 6).clearly_better_than(&of(0.05, 6)), "within the track's own sigma");
+    }
+
+    #[test]
+    fn a_result_beyond_every_number_is_none() {
+        let found = run(source(4.0, |t| (t.powi(4), 4.0 * t.powi(3))), PCF).expect("long enough");
+        assert!(found.at(6.0).is_some() && found.at(1e200).is_none());
     }
 
     #[test]

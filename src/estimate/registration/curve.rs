@@ -17,24 +17,29 @@ pub struct RegisteredCurve {
 }
 
 impl RegisteredCurve {
-    /// The curve over these pieces, from and to in s, in order: those of the samples at their true times.
-    #[must_use]
-    pub fn over(mut self, pieces: &[(f64, f64)]) -> Self {
-        self.pieces = pieces.to_vec();
-        self
+    /// Lets it cover these pieces, from and to in s, in order: those of the samples at their true times.
+    pub fn cover(&mut self, pieces: Vec<(f64, f64)>) {
+        self.pieces = pieces;
     }
 
     /// The instant nearest to `time_s` that it covers, and how far that is away, s.
     #[must_use]
     pub fn nearest(&self, time_s: f64) -> (f64, f64) {
-        let near = self.pieces.iter().map(|p| time_s.clamp(p.0, p.1)).map(|t| (t, (time_s - t).abs()));
+        let after = self.first_not_before(time_s);
+        let about = self.pieces[after.saturating_sub(1)..].iter().take(2);
+        let near = about.map(|p| time_s.clamp(p.0, p.1)).map(|t| (t, (time_s - t).abs()));
         near.reduce(|a, b| if b.1 < a.1 { b } else { a }).unwrap_or((time_s, 0.0))
+    }
+
+    /// Index of the first piece that doesn't end before `time_s`.
+    fn first_not_before(&self, time_s: f64) -> usize {
+        self.pieces.partition_point(|p| p.1 < time_s)
     }
 }
 
 impl Curve for RegisteredCurve {
     fn at(&self, time_s: f64) -> Option<State> {
-        let inside = self.pieces.iter().any(|p| (p.0..=p.1).contains(&time_s));
+        let inside = self.pieces.get(self.first_not_before(time_s)).is_some_and(|p| p.0 <= time_s);
         inside.then(|| vectorised(StateAt { curve: self, time_s }))
     }
 }

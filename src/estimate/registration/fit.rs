@@ -2,17 +2,17 @@
 
 use super::bordered::{Layout, Posterior, eliminate};
 use super::knots::{Knots, Penalty};
-use super::model::{Anchor, Reference};
+use super::model::Reference;
 use super::noise::Level;
 use super::normal::{Normal, Weighted, motion};
+use super::relaxation::Relaxation;
 use super::residuals::Residuals;
 use super::selection::{self, Averaged, Inclusion};
 use super::smoothing::likeliest_lambda;
+use super::start::Guess;
 use super::unknowns::{Kind, OF_A_SOURCE, SourceErrors, index, kind_of};
-use super::{Settings, separation};
-use crate::estimate::spline;
+use super::{REJECTED_WEIGHT, Settings, separation};
 use crate::math::gaussian_basis::Active;
-use crate::math::robust;
 use crate::sample::{Quantity, Source};
 
 /// Steps with weights that minimise absolute values, before outliers are told from noise: so many, and more until the
@@ -44,30 +44,32 @@ const PAD_SIGMAS: f64 = 8.0;
 /// A clock offset that comes near the last of these knots begins anew with four times as many, so often at most.
 const MOST_WIDENINGS: usize = 3;
 
-/// No finer by default, s: velocity bands want a thrust's onset in 0.3 s to be followed.
-const FINEST_SPACING_S: f64 = 0.04;
+/// Fewest samples beside another source's that say whether a source is to be trusted.
+const MIN_COMPARED: usize = 8;
 
 /// Decades about the last lambda that the next one is looked for in, at most.
-const WIDEST_SEARCH: f64 = 0.7;
+pub(super) const WIDEST_SEARCH: f64 = 0.7;
 
 /// What is being fitted, and how far it is.
 pub(super) struct Fit<'a> {
     pub(super) sources: &'a [Source],
     pub(super) settings: &'a Settings,
     pub(super) knots: Knots,
-    penalty: Penalty,
+    pub(super) penalty: Penalty,
     pub(super) references: Vec<Reference>,
     /// Whether the source's rotation is looked for.
-    rotated: Vec<bool>,
+    pub(super) rotated: Vec<bool>,
+    /// Whether outliers are looked for among the source's samples.
+    pub(super) robust: Vec<bool>,
     pub(super) layout: Layout,
     pub(super) levels: Vec<[Level; 2]>,
     /// Robust weights by source, quantity and sample.
     pub(super) weights: Vec<[Vec<f64>; 2]>,
     pub(super) lambda: [f64; 3],
     /// How far about the last lambda the next one is looked for, decades.
-    search_decades: [f64; 3],
-    relaxations: Vec<Relaxation>,
-    stage: Stage,
+    pub(super) search_decades: [f64; 3],
+    pub(super) relaxations: Vec<Relaxation>,
+    pub(super) stage: Stage,
     pub(super) posterior: Option<Posterior>,
     pub(super) inclusions: Vec<Inclusion>,
     pub(super) separations: Vec<(Option<(separation::Name, f64)>, separation::Separation)>,
@@ -78,7 +80,7 @@ pub(super) struct Fit<'a> {
 
 /// Which way of weighing samples.
 #[derive(Clone, Copy, PartialEq)]
-enum Stage {
+pub(super) enum Stage {
     /// By absolute values.
     First,
     /// By a mixture of scales, since that many steps.
@@ -95,104 +97,105 @@ enum Choice {
 }
 
 impl<'a> Fit<'a> {
-    /// Fits all `sources`, those with an angle turned by about that much against the datum. `None` where the data
-    /// leave the curve open.
+    /// Fits all `sources` from a first guess of each. `None` where the data leave the curve open.
     pub(super) fn run(
         sources: &'a [Source],
         datum: usize,
         pieces: &[(f64, f64)],
-        rotations: &[Option<f64>],
+        guesses: &[Guess],
         settings: &'a Settings,
     ) -> Option<Self> {
-        let mut pad_s = PAD_SIGMAS * settings.priors.clock_offset_s;
-        let mut fit = Self::once(Self::start(sources, datum, pieces, rotations, settings, pad_s))?;
+        let latest = guesses.iter().map(|g| g.clock_offset_s.abs()).fold(0.0, f64::max);
+        let mut pad_s = PAD_SIGMAS * settings.priors.clock_offset_s + latest;
+        let mut fit = Self::once(Self::start(sources, datum, pieces, guesses, settings, pad_s))?;
         for _ in 0..MOST_WIDENINGS {
             let latest = fit.references.iter().map(|r| r.errors.clock_offset_s.abs()).fold(0.0, f64::max);
             if latest < 0.8 * pad_s {
                 break;
             }
             pad_s *= 4.0;
-            fit = Self::once(Self::start(sources, datum, pieces, rotations, settings, pad_s))?;
+            fit = Self::once(Self::start(sources, datum, pieces, guesses, settings, pad_s))?;
         }
         Some(fit)
     }
 
     /// All steps from the start to the end.
     fn once(mut fit: Self) -> Option<Self> {
-        let settings = fit.settings;
-        for step in 0..MOST_STEPS {
-            let before = (fit.posterior.as_ref().map(|p| p.unknowns.clone()), fit.levels.clone());
-            fit.solve(Choice::All)?;
-            if step == 0 {
-                fit.put_anchors_on_curve();
-            }
-            fit.reweigh();
-            fit.iterations = step + 1;
-            match fit.stage {
-                Stage::First => {
-                    let over = fit.iterations >= FIRST_STEPS && fit.clocks_rest();
-                    if over || fit.iterations == MOST_FIRST_STEPS {
-                        fit.stage = Stage::Mixture { since: fit.iterations };
-                    }
-                }
-                Stage::Mixture { since } => {
-                    fit.converged =
-                        fit.iterations > since + 1 && fit.is_settled(before.0.as_deref(), &before.1);
-                }
-            }
-            if fit.converged {
-                break;
-            }
+        fit.settle()?;
+        if fit.distrust() {
+            fit.settle()?;
         }
-        if settings.select {
+        if fit.settings.select {
             for _ in 0..LAST_STEPS {
                 fit.solve(Choice::ByEvidence)?;
                 fit.reweigh();
             }
         }
-        fit.solve(if settings.select { Choice::ByEvidence } else { Choice::All })?;
+        fit.solve(if fit.settings.select { Choice::ByEvidence } else { Choice::All })?;
         Some(fit)
     }
 
-    fn start(
-        sources: &'a [Source],
-        datum: usize,
-        pieces: &[(f64, f64)],
-        rotations: &[Option<f64>],
-        settings: &'a Settings,
-        pad_s: f64,
-    ) -> Self {
-        let spacing_s = settings.knot_spacing_s.unwrap_or_else(|| spacing_s(sources, pieces));
-        let knots = Knots::covering(pieces, spacing_s, pad_s);
-        let centre = middle(sources);
-        let reference = |i: usize| Reference {
-            anchor: Anchor { time_s: common_s(&sources[i], &sources[datum]), point_m: centre },
-            errors: SourceErrors { rotation_rad: rotations[i].unwrap_or(0.0), ..SourceErrors::default() },
-            is_datum: i == datum,
-            centre,
-        };
-        let slots: Vec<usize> = (0..sources.len()).filter(|&i| i != datum).collect();
-        Self {
-            sources,
-            settings,
-            penalty: knots.jerk_penalty(),
-            knots,
-            references: (0..sources.len()).map(reference).collect(),
-            rotated: rotations.iter().map(Option::is_some).collect(),
-            levels: vec![[Level::default(); 2]; sources.len()],
-            weights: sources.iter().map(|s| Quantity::ALL.map(|q| vec![1.0; s.series(q).len()])).collect(),
-            lambda: [1.0; 3],
-            search_decades: [WIDEST_SEARCH; 3],
-            relaxations: vec![Relaxation::default(); slots.len()],
-            stage: Stage::First,
-            layout: Layout { slots, active: Vec::new() },
-            posterior: None,
-            inclusions: Vec::new(),
-            separations: Vec::new(),
-            log_evidence: 0.0,
-            iterations: 0,
-            converged: false,
+    /// Steps until nothing moves.
+    fn settle(&mut self) -> Option<()> {
+        for _ in 0..MOST_STEPS {
+            let before = (self.posterior.as_ref().map(|p| p.unknowns.clone()), self.levels.clone());
+            self.solve(Choice::All)?;
+            if before.0.is_none() {
+                self.put_anchors_on_curve();
+            }
+            self.reweigh();
+            self.iterations += 1;
+            match self.stage {
+                Stage::First => {
+                    let over = self.iterations >= FIRST_STEPS && self.clocks_rest();
+                    if over || self.iterations == MOST_FIRST_STEPS {
+                        self.stage = Stage::Mixture { since: self.iterations };
+                    }
+                }
+                Stage::Mixture { since } => {
+                    self.converged =
+                        self.iterations > since + 1 && self.is_settled(before.0.as_deref(), &before.1);
+                }
+            }
+            if self.converged {
+                break;
+            }
         }
+        Some(())
+    }
+
+    /// Takes all samples of a source for noise whose samples are rejected more often than not where another one sees:
+    /// it has an error that the model doesn't hold, and where it sees alone nothing would show it. Whether there is
+    /// one.
+    fn distrust(&mut self) -> bool {
+        let spans: Vec<Option<(f64, f64)>> = self.sources.iter().map(Source::span_s).collect();
+        let mut any = false;
+        for (i, source) in self.sources.iter().enumerate() {
+            let compared = |time_s: f64| {
+                let sees = |(j, span): (usize, &Option<(f64, f64)>)| {
+                    j != i && span.is_some_and(|(from_s, to_s)| (from_s..=to_s).contains(&time_s))
+                };
+                spans.iter().enumerate().any(sees)
+            };
+            let contradicted = Quantity::ALL.iter().any(|&quantity| {
+                let weights = &self.weights[i][quantity as usize];
+                let compared = source.series(quantity).iter().zip(weights).filter(|s| compared(s.0.time_s));
+                let (all, bad) = compared.fold((0, 0), |(all, bad), (_, weight)| {
+                    (all + 1, bad + usize::from(*weight < REJECTED_WEIGHT))
+                });
+                all >= MIN_COMPARED && 2 * bad > all
+            });
+            if contradicted {
+                self.robust[i] = false;
+                self.weights[i].iter_mut().for_each(|weights| weights.fill(1.0));
+                any = true;
+            }
+        }
+        if any {
+            self.stage = Stage::Mixture { since: self.iterations };
+            self.converged = false;
+        }
+        any
     }
 
     /// The unknowns that can act: not those of a quantity that isn't measured, and, while there is no curve, not
@@ -286,8 +289,12 @@ impl<'a> Fit<'a> {
             let before = self.references[source].errors;
             let mut errors = SourceErrors::of(&posterior.unknowns, slot);
             let step = errors.clock_offset_s - before.clock_offset_s;
-            errors.clock_offset_s = before.clock_offset_s + self.relaxations[slot].shorten(step);
-            if !self.layout.active.contains(&index(slot, Kind::Rotation, 0)) {
+            let acts = |kind| self.layout.active.contains(&index(slot, kind, 0));
+            errors.clock_offset_s = before.clock_offset_s;
+            if acts(Kind::ClockOffset) {
+                errors.clock_offset_s += self.relaxations[slot].shorten(step);
+            }
+            if !acts(Kind::Rotation) {
                 errors.rotation_rad = before.rotation_rad;
             }
             self.references[source].errors = errors;
@@ -320,10 +327,10 @@ impl<'a> Fit<'a> {
                 let level = &mut self.levels[source][quantity as usize];
                 let weights = &mut self.weights[source][quantity as usize];
                 match self.stage {
-                    Stage::First if self.settings.robust => level.first_weights(&residuals, weights),
+                    Stage::First if self.robust[source] => level.first_weights(&residuals, weights),
                     Stage::First => level.step(&residuals, weights, false),
                     Stage::Mixture { .. } => {
-                        level.step(&residuals, weights, self.settings.robust);
+                        level.step(&residuals, weights, self.robust[source]);
                         level.correlate(&residuals, weights);
                     }
                 }
@@ -350,56 +357,4 @@ impl<'a> Fit<'a> {
         let calm = |(a, b): (&Level, &Level)| (a.precision() / b.precision()).ln().abs() < SMALL_CHANGE;
         self.levels.iter().flatten().zip(levels.iter().flatten()).all(calm) && (0..before.len()).all(still)
     }
-}
-
-/// Shortens steps that swing to and fro (Aitken's relaxation): a clock offset that rests on a gap moves half the
-/// track, and Gauss-Newton overshoots.
-#[derive(Clone, Copy, Debug)]
-struct Relaxation {
-    share: f64,
-    last: f64,
-}
-
-impl Default for Relaxation {
-    fn default() -> Self {
-        Self { share: 1.0, last: 0.0 }
-    }
-}
-
-impl Relaxation {
-    const SHORTEST: f64 = 0.25;
-
-    fn shorten(&mut self, step: f64) -> f64 {
-        let difference = self.last - step;
-        self.share = if self.last == 0.0 || difference == 0.0 {
-            1.0
-        } else {
-            (self.share * self.last / difference).clamp(Self::SHORTEST, 1.0)
-        };
-        self.last = step;
-        self.share * step
-    }
-}
-
-/// The fastest source's median interval, but no finer than 0.04 s, and no more knots than the spline's.
-fn spacing_s(sources: &[Source], pieces: &[(f64, f64)]) -> f64 {
-    let seen_s: f64 = pieces.iter().map(|p| p.1 - p.0).sum();
-    let fastest = sources.iter().filter_map(crate::estimate::coverage::median_interval_s);
-    let wanted = fastest.fold(f64::INFINITY, f64::min);
-    let wanted = if wanted.is_finite() { wanted.max(FINEST_SPACING_S) } else { FINEST_SPACING_S };
-    wanted.max(spline::finest_affordable_s(sources, 0.0, seen_s))
-}
-
-/// The medians of the positions: coefficients about it are small, and so are rounding and ripple.
-fn middle(sources: &[Source]) -> [f64; 3] {
-    std::array::from_fn(|axis| {
-        let mut values: Vec<f64> = sources.iter().flat_map(|s| &s.positions).map(|p| p.value[axis]).collect();
-        robust::median(&mut values).unwrap_or(0.0)
-    })
-}
-
-/// The middle of the overlap, or of the gap, of two sources.
-fn common_s(a: &Source, b: &Source) -> f64 {
-    let (Some(a), Some(b)) = (a.span_s(), b.span_s()) else { return 0.0 };
-    a.0.max(b.0).midpoint(a.1.min(b.1))
 }

@@ -31,12 +31,13 @@
 //! | `noise`, `residuals` | noise levels as variance components, outliers by a mixture of scales, correlated noise widens |
 //! | `selection` | which errors there are, by evidence, averaged (MacKay 1992; Madigan, Raftery 1994) |
 //! | `separation` | which unknowns the data can tell apart |
-//! | `rotation` | where to begin with a large angle (Procrustes) |
+//! | `clock`, `rotation` | where to begin with a clock that is far off, and with a large angle (Procrustes) |
 //!
 //! Only differences are seen: an error that all sources share, or one of the datum, stays in the track and in no
 //! band.
 
 mod bordered;
+mod clock;
 mod correction;
 mod curve;
 mod fit;
@@ -45,11 +46,13 @@ mod model;
 mod noise;
 mod normal;
 mod outcome;
+mod relaxation;
 mod residuals;
 mod rotation;
 mod selection;
 mod separation;
 mod smoothing;
+mod start;
 mod unknowns;
 
 pub use curve::RegisteredCurve;
@@ -58,7 +61,10 @@ pub use noise::Level;
 pub use separation::{Name, Separation, Unknown};
 pub use unknowns::{Kind, Priors, SourceErrors};
 
+use std::sync::Arc;
+
 use fit::Fit;
+use start::Guess;
 
 use super::coverage::Coverage;
 use super::{EstimateError, check, spline};
@@ -113,7 +119,7 @@ pub struct Rejected {
 #[derive(Clone, Debug)]
 pub struct Registered {
     /// The track as the datum would see it.
-    pub curve: RegisteredCurve,
+    pub curve: Arc<RegisteredCurve>,
     /// The errors by source; all zero for the datum.
     pub errors: Vec<SourceErrors>,
     /// Their standard deviations.
@@ -170,19 +176,28 @@ pub fn register(
     if datum >= sources.len() || pieces.is_empty() {
         return Err(undetermined("there is no datum, or no time to cover"));
     }
-    let mut rotations = vec![None; sources.len()];
-    let run = |rotations: &[Option<f64>]| Fit::run(sources, datum, pieces, rotations, settings);
-    let mut best = run(&rotations);
+    let coverage = Coverage::of(sources);
+    let others = || (0..sources.len()).filter(|&s| s != datum);
+    let mut guesses = vec![Guess::default(); sources.len()];
+    if settings.kinds.contains(&Kind::ClockOffset) {
+        for source in others() {
+            guesses[source].clock_offset_s =
+                clock::first_offset_s(sources, datum, source, &coverage, &settings.priors);
+        }
+    }
+    let run = |guesses: &[Guess]| Fit::run(sources, datum, pieces, guesses, settings);
+    let mut best = run(&guesses);
     if settings.kinds.contains(&Kind::Rotation) {
-        let coverage = Coverage::of(sources);
-        for source in (0..sources.len()).filter(|&s| s != datum) {
-            for angle in rotation::candidates(sources, datum, source, &coverage, &settings.priors) {
-                let mut turned = rotations.clone();
-                turned[source] = Some(angle);
+        for source in others() {
+            let offset_s = guesses[source].clock_offset_s;
+            for angle in rotation::candidates(sources, datum, (source, offset_s), &coverage, &settings.priors)
+            {
+                let mut turned = guesses.clone();
+                turned[source].rotation_rad = Some(angle);
                 let Some(tried) = run(&turned) else { continue };
-                let odds = if rotations[source].is_some() { 0.0 } else { ROTATION_ODDS };
+                let odds = if guesses[source].rotation_rad.is_some() { 0.0 } else { ROTATION_ODDS };
                 if best.as_ref().is_none_or(|b| tried.log_evidence > b.log_evidence + odds) {
-                    (best, rotations) = (Some(tried), turned);
+                    (best, guesses) = (Some(tried), turned);
                 }
             }
         }

@@ -1,10 +1,12 @@
 //! What is left of the samples: noise levels, outliers and correlation, one a series.
 //!
 //! The squared length of a residual over its sigmas, q, is that of three normal numbers of variance phi, or, for
-//! the few that are outliers, of variance 25 phi or 10,000 phi:
+//! the few that are outliers, of variance 25 phi, or of 10,000 phi and whatever is above: a position in the wrong
+//! unit, or a zero for one that is missing, may be off by any amount:
 //!
 //! ```text
-//! gamma_k ~ pi_k s_k^-3 exp(-q / (2 s_k^2 phi)),   weight = sum_k gamma_k / s_k^2,   s = 1, 5, 100      (1)
+//! gamma_k ~ pi_k s_k^-3 exp(-q / (2 s_k^2 phi)),   weight = sum_k gamma_k / s_k^2                      (1)
+//! s = 1, 5, max(100, sqrt(q / (3 phi)))
 //! phi     = sum weight q / (3 n - degrees of freedom of the fit)                                       (2)
 //! ```
 //!
@@ -17,8 +19,10 @@
 use super::residuals::Residuals;
 use crate::math::robust;
 
-/// Scales of the mixture, in sigmas.
-const SCALES: [f64; 3] = [1.0, 5.0, 100.0];
+/// Scales of the mixture, in sigmas, for a residual of squared length `q` in these.
+fn scales(q: f64) -> [f64; 3] {
+    [1.0, 5.0, f64::max(100.0, (q / 3.0).sqrt())]
+}
 
 /// Shares that the scales have before anything is known, worth this many samples.
 const PRIOR_SHARES: [f64; 3] = [0.98, 0.01, 0.01];
@@ -63,7 +67,7 @@ impl Level {
         let squares: Vec<f64> = weights
             .iter()
             .enumerate()
-            .map(|(i, weight)| residuals.predicted_square(i, weight * precision))
+            .map(|(i, weight)| residuals.predicted_square(i, *weight, precision))
             .collect();
         let Some(median) = robust::median(&mut squares.clone()) else { return };
         self.scale = (median / CHI_SQUARE_3_MEDIAN).sqrt().max(SMALLEST_SCALE);
@@ -82,9 +86,10 @@ impl Level {
         if robust {
             let mut counts = PRIOR_SHARES.map(|share| share * PRIOR_SAMPLES);
             for (i, weight) in weights.iter_mut().enumerate() {
-                let q = residuals.predicted_square(i, *weight * precision);
+                let q = residuals.predicted_square(i, *weight, precision);
                 let gamma = responsibilities(self.shares, q / variance);
-                *weight = (0..3).map(|k| gamma[k] / (SCALES[k] * SCALES[k])).sum(); // (1)
+                let scales = scales(q / variance);
+                *weight = (0..3).map(|k| gamma[k] / (scales[k] * scales[k])).sum(); // (1)
                 (0..3).for_each(|k| counts[k] += gamma[k]);
             }
             self.shares = counts.map(|c| c / (n + PRIOR_SAMPLES));
@@ -122,12 +127,45 @@ impl Level {
 }
 
 fn responsibilities(shares: [f64; 3], q: f64) -> [f64; 3] {
+    let scales = scales(q);
     let logs: [f64; 3] = std::array::from_fn(|k| {
-        let s = SCALES[k];
+        let s = scales[k];
         shares[k].ln() - 3.0 * s.ln() - 0.5 * q / (s * s)
     });
     let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let parts = logs.map(|l| (l - largest).exp());
     let sum: f64 = parts.iter().sum();
     parts.map(|p| p / sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sample_that_was_given_no_weight_is_judged_by_the_track_without_it() {
+        // one number, known to a variance of 4 before, and a sample of it that is 3 off and has next to no weight
+        for weight in [1.0, 0.1, 1e-4] {
+            let share = 4.0 / (4.0 + 1.0 / weight);
+            let residuals = Residuals {
+                scaled: vec![[3.0 * (1.0 - share); 3]],
+                leverage: vec![[4.0 * (1.0 - share); 3]],
+            };
+            let found = residuals.predicted_square(0, weight, 1.0);
+            assert!((found - 3.0 * 9.0 / 5.0).abs() < 1e-9, "{weight}: {found}");
+        }
+    }
+
+    #[test]
+    fn a_tenth_of_samples_that_are_off_by_a_million_does_not_change_the_noise() {
+        let scaled = |i: usize| if i.is_multiple_of(10) { [1e6; 3] } else { [[1.0; 3], [-1.0; 3]][i % 2] };
+        let residuals = Residuals { scaled: (0..200).map(scaled).collect(), leverage: vec![[0.0; 3]; 200] };
+        let (mut level, mut weights) = (Level::default(), vec![1.0; 200]);
+        level.first_weights(&residuals, &mut weights);
+        for _ in 0..20 {
+            level.step(&residuals, &mut weights, true);
+        }
+        assert!((level.scale - 1.0).abs() < 0.05, "{level:?}");
+        assert!(weights.iter().step_by(10).all(|w| *w < 1e-9), "{weights:?}");
+    }
 }

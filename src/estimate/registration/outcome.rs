@@ -1,5 +1,7 @@
 //! What is to be said of a fit that has ended.
 
+use std::sync::Arc;
+
 use super::curve::RegisteredCurve;
 use super::fit::Fit;
 use super::separation::{Separation, Unknown, name_of};
@@ -22,7 +24,7 @@ impl Fit<'_> {
                 for (index, weight) in weights.iter().enumerate() {
                     if *weight < REJECTED_WEIGHT {
                         let time_s = self.sources[source].series(quantity)[index].time_s;
-                        let q = residuals.predicted_square(index, weight * level.precision());
+                        let q = residuals.predicted_square(index, *weight, level.precision());
                         rejected.push(Rejected {
                             source,
                             quantity,
@@ -69,12 +71,12 @@ impl Fit<'_> {
             log_evidence: self.log_evidence,
             iterations: self.iterations,
             converged: self.converged,
-            curve: RegisteredCurve {
+            curve: Arc::new(RegisteredCurve {
                 centre: self.references[0].centre,
                 knots: self.knots,
                 posterior,
                 pieces: pieces.to_vec(),
-            },
+            }),
         })
     }
 }

@@ -26,11 +26,17 @@ impl Residuals {
         self.scaled.iter().map(|r| r.iter().map(|x| x * x).sum())
     }
 
-    /// The squared length of one of them over its own standard deviation, in a fit that gave its sample so many times
-    /// the stated weight: r^2 / (1 - h).
-    pub(super) fn predicted_square(&self, i: usize, weight: f64) -> f64 {
-        let (left, leverage) = (self.scaled[i], self.leverage[i]);
-        (0..3).map(|a| left[a] * left[a] / (1.0 - weight * leverage[a]).max(SMALLEST_REST)).sum()
+    /// The squared length of one of them over its own standard deviation, in a fit that gave its sample `weight` times
+    /// the precision of one that is no outlier: e^2 / (1 + V), with e the residual and V the variance of the fit
+    /// without this sample, in units of the noise's; with h its share in its own fit, e = r / (1 - h) and
+    /// V = (h / weight) / (1 - h).
+    pub(super) fn predicted_square(&self, i: usize, weight: f64, precision: f64) -> f64 {
+        let own = |axis: usize| {
+            let variance = precision * self.leverage[i][axis];
+            let rest = (1.0 - weight * variance).max(SMALLEST_REST);
+            self.scaled[i][axis].powi(2) / (rest * (rest + variance))
+        };
+        own(0) + own(1) + own(2)
     }
 
     /// Those of one series of the source in `slot`, `None` for the datum.

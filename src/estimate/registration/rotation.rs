@@ -24,18 +24,19 @@ const AT_AN_END: usize = 20;
 
 type Pair = ([f64; 2], [f64; 2]);
 
-/// The angles, rad, that `source` may be turned by against the datum; none where it seems not to be.
+/// The angles, rad, that `source`, whose stamps are late by about `offset_s`, may be turned by against the datum; none
+/// where it seems not to be.
 pub(super) fn candidates(
     sources: &[Source],
     datum: usize,
-    source: usize,
+    (source, offset_s): (usize, f64),
     coverage: &Coverage,
     priors: &Priors,
 ) -> Vec<f64> {
     let mut angles: Vec<f64> = Vec::new();
     for quantity in Quantity::ALL {
         let (from, to) = (sources[datum].series(quantity), sources[source].series(quantity));
-        let mut pairs = pairs(from, to, coverage.outage_s(datum, quantity));
+        let mut pairs = pairs(from, to, offset_s, coverage.outage_s(datum, quantity));
         let slack = match quantity {
             Quantity::Position => {
                 centre(&mut pairs);
@@ -66,8 +67,9 @@ fn level(v: [f64; 3]) -> [f64; 2] {
 }
 
 /// The datum's and the source's vectors at the source's instants.
-fn pairs(from: &[Sample], to: &[Sample], max_gap_s: f64) -> Vec<Pair> {
-    let pair = |s: &Sample| Some((level(interpolate(from, s.time_s, max_gap_s)?.value), level(s.value)));
+fn pairs(from: &[Sample], to: &[Sample], offset_s: f64, max_gap_s: f64) -> Vec<Pair> {
+    let pair =
+        |s: &Sample| Some((level(interpolate(from, s.time_s - offset_s, max_gap_s)?.value), level(s.value)));
     to.iter().filter_map(pair).collect()
 }
 

@@ -126,19 +126,24 @@ pub(super) fn average(information: &Information, layout: &Layout, priors: &Prior
     let (found, best) = models.search();
     let total: f64 = found.iter().map(|(_, w)| w).sum();
     let k = variances.len();
+    // counted from one of them, so that what differs isn't lost in the rounding of what doesn't
+    let mut reference = None;
     let mut mean = DVector::zeros(k);
     let mut second = DMatrix::zeros(k, k);
     let mut probabilities = vec![0.0; groups.len()];
     for (levels, weight) in &found {
         let share = weight / total;
         let one = models.estimate(levels)?;
-        mean += share * &one.mean;
-        second += share * (one.covariance + &one.mean * one.mean.transpose());
+        let origin: &DVector<f64> = reference.get_or_insert_with(|| one.mean.clone());
+        let from = one.mean - origin;
+        second += share * (one.covariance + &from * from.transpose());
+        mean += from * share;
         for (probability, &level) in probabilities.iter_mut().zip(levels) {
             *probability += if level == 0 { 0.0 } else { share };
         }
     }
     let covariance = second - &mean * mean.transpose();
+    let mean = mean + reference?;
     let inclusions = groups.iter().zip(probabilities).map(|(group, probability)| Inclusion {
         source: group.source,
         kind: group.kind,

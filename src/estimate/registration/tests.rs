@@ -297,6 +297,33 @@ fn a_clock_that_is_early_by_more_than_the_first_knots_reach_loses_no_samples() {
 }
 
 #[test]
+fn a_clock_that_is_off_by_a_third_of_a_turn_does_not_end_in_the_wrong_valley() {
+    for offset_s in [1.3, -1.6] {
+        let found = registered(&pair(SourceErrors { clock_offset_s: offset_s, ..errors() }, 22));
+        let (e, s) = (&found.errors[1], &found.sigmas[1]);
+        assert!((e.clock_offset_s - offset_s).abs() < 3.0 * s.clock_offset_s, "{e:?} +- {s:?}");
+        assert!(s.clock_offset_s < 0.02 && e.rotation_rad.abs() < f64::MIN_POSITIVE, "{e:?} +- {s:?}");
+    }
+}
+
+#[test]
+fn a_source_that_the_others_contradict_is_not_believed_where_it_sees_alone() {
+    let mut sources = pair(errors(), 23);
+    for q in Quantity::ALL {
+        sources[1].series_mut(q).iter_mut().for_each(|s| s.value[2] = -s.value[2]);
+    }
+    let found = registered(&sources);
+    assert!(found.noise[1][0].scale > 10.0, "{:?}", found.noise);
+    for t in [6.5, 7.5, 8.5, 9.5] {
+        let state = found.curve.at(t).expect("inside");
+        assert!(
+            (state.position[2] - winding(t).0[2]).abs() < 4.0 * state.position_sigma[2],
+            "{t} s: {state:?}"
+        );
+    }
+}
+
+#[test]
 fn frames_that_are_turned_by_128_degrees_are_registered_with_and_without_an_overlap() {
     let angle = 128.0_f64.to_radians();
     for (begin, seed) in [(4.0, 5), (6.3, 6)] {

@@ -1,0 +1,97 @@
+//! Where a fit begins.
+
+use super::Settings;
+use super::bordered::Layout;
+use super::fit::{Fit, Stage, WIDEST_SEARCH};
+use super::knots::Knots;
+use super::model::{Anchor, Reference};
+use super::noise::Level;
+use super::relaxation::Relaxation;
+use super::unknowns::SourceErrors;
+use crate::estimate::spline;
+use crate::math::robust;
+use crate::sample::{Quantity, Source};
+
+/// No finer by default, s: velocity bands want a thrust's onset in 0.3 s to be followed.
+const FINEST_SPACING_S: f64 = 0.04;
+
+/// What a source is thought to be off by before anything is fitted.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Guess {
+    /// How late its stamps are, s.
+    pub(super) clock_offset_s: f64,
+    /// Its angle against the datum, rad, if one is to be looked for.
+    pub(super) rotation_rad: Option<f64>,
+}
+
+impl<'a> Fit<'a> {
+    /// No curve yet, all samples alike, knots up to `pad_s` beyond both ends of each piece.
+    pub(super) fn start(
+        sources: &'a [Source],
+        datum: usize,
+        pieces: &[(f64, f64)],
+        guesses: &[Guess],
+        settings: &'a Settings,
+        pad_s: f64,
+    ) -> Self {
+        let spacing_s = settings.knot_spacing_s.unwrap_or_else(|| spacing_s(sources, pieces));
+        let knots = Knots::covering(pieces, spacing_s, pad_s);
+        let centre = middle(sources);
+        let reference = |i: usize| Reference {
+            anchor: Anchor { time_s: common_s(&sources[i], &sources[datum]), point_m: centre },
+            errors: SourceErrors {
+                clock_offset_s: guesses[i].clock_offset_s,
+                rotation_rad: guesses[i].rotation_rad.unwrap_or(0.0),
+                ..SourceErrors::default()
+            },
+            is_datum: i == datum,
+            centre,
+        };
+        let slots: Vec<usize> = (0..sources.len()).filter(|&i| i != datum).collect();
+        Self {
+            sources,
+            settings,
+            penalty: knots.jerk_penalty(),
+            knots,
+            references: (0..sources.len()).map(reference).collect(),
+            rotated: guesses.iter().map(|g| g.rotation_rad.is_some()).collect(),
+            robust: vec![settings.robust; sources.len()],
+            levels: vec![[Level::default(); 2]; sources.len()],
+            weights: sources.iter().map(|s| Quantity::ALL.map(|q| vec![1.0; s.series(q).len()])).collect(),
+            lambda: [1.0; 3],
+            search_decades: [WIDEST_SEARCH; 3],
+            relaxations: vec![Relaxation::default(); slots.len()],
+            stage: Stage::First,
+            layout: Layout { slots, active: Vec::new() },
+            posterior: None,
+            inclusions: Vec::new(),
+            separations: Vec::new(),
+            log_evidence: 0.0,
+            iterations: 0,
+            converged: false,
+        }
+    }
+}
+
+/// The fastest source's median interval, but no finer than 0.04 s, and no more knots than the spline's.
+fn spacing_s(sources: &[Source], pieces: &[(f64, f64)]) -> f64 {
+    let seen_s: f64 = pieces.iter().map(|p| p.1 - p.0).sum();
+    let fastest = sources.iter().filter_map(crate::estimate::coverage::median_interval_s);
+    let wanted = fastest.fold(f64::INFINITY, f64::min);
+    let wanted = if wanted.is_finite() { wanted.max(FINEST_SPACING_S) } else { FINEST_SPACING_S };
+    wanted.max(spline::finest_affordable_s(sources, 0.0, seen_s))
+}
+
+/// The medians of the positions: coefficients about it are small, and so are rounding and ripple.
+fn middle(sources: &[Source]) -> [f64; 3] {
+    std::array::from_fn(|axis| {
+        let mut values: Vec<f64> = sources.iter().flat_map(|s| &s.positions).map(|p| p.value[axis]).collect();
+        robust::median(&mut values).unwrap_or(0.0)
+    })
+}
+
+/// The middle of the overlap, or of the gap, of two sources.
+fn common_s(a: &Source, b: &Source) -> f64 {
+    let (Some(a), Some(b)) = (a.span_s(), b.span_s()) else { return 0.0 };
+    a.0.max(b.0).midpoint(a.1.min(b.1))
+}
