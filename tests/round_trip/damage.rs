@@ -98,7 +98,7 @@ fn messages_before(bytes: &[u8], len: usize) -> (Vec<(u32, Vec<u8>)>, usize) {
 /// All that can be read, however much of the log can't.
 fn read(log: &Log) -> (Vec<(u32, Vec<u8>)>, usize) {
     let mut messages = Vec::new();
-    let channels = (0..100).collect();
+    let channels = (0..=u16::MAX).collect();
     let excerpt = log.for_each_message_of_excerpt(&channels, u64::MAX, |m| {
         messages.push((m.sequence, m.data.to_vec()));
     });
