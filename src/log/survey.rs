@@ -75,7 +75,7 @@ pub(super) fn complete(
     let scanned = distrusted || !is_complete(survey.index);
     if scanned {
         survey.scan()?;
-    } else if survey.hidden.is_none() {
+    } else {
         survey.find_hidden()?;
     }
     let visibility = survey.visibility(read_by_index);
@@ -187,9 +187,9 @@ impl Survey<'_> {
         };
         let unclear: Vec<ChunkIndex> = self.index.chunks.iter().filter(unclear).cloned().collect();
         for chunk in unclear {
-            self.look(&Block::Chunk(&chunk))?;
-            if self.hidden.is_some() {
-                break;
+            // No index shall name one that can't be decoded.
+            if self.hidden.is_none() || self.unnamed.contains(&chunk.chunk_start_offset) {
+                self.look(&Block::Chunk(&chunk))?;
             }
         }
         Ok(())
