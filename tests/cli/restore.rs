@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::output::validate;
 use super::trial::{Output, Ran, Trial, assert_says, trackfuse};
-use super::trial_log::{TrialLog, two_sensors};
+use super::trial_log::two_sensors;
 use crate::viewer_rules;
 
 fn run(trial: &Trial, args: &[&str]) -> Ran {
