@@ -11,8 +11,10 @@ mod viewer_rules;
 mod cli {
     mod bad_input;
     mod compare;
+    mod encodings;
     mod exit_code;
     mod export;
+    mod fixes;
     mod init;
     mod inspect;
     mod output;

@@ -18,7 +18,7 @@ use crate::tally::{Sum, Tally, print_head, print_pooled, print_row};
 /// A log's sources, the datum's index, and the instant that the samples' seconds count from.
 fn load(log: &Log) -> (Vec<Source>, usize, Time) {
     let configs = source::recognise(log, "/fused").expect("a log with sources").sources;
-    let (loaded, origin, _) = source::load(log, &configs, false).expect("samples");
+    let (loaded, origin, _) = source::load(log, &configs, false, None).expect("samples");
     let configs: Vec<SourceConfig> = loaded.iter().map(|l| l.config.clone()).collect();
     (loaded.into_iter().map(|l| l.source).collect(), source::datum(&configs), origin)
 }
@@ -76,7 +76,7 @@ pub(crate) fn flight(path: &Path, truth: &str) {
     let (sources, datum, origin) = load(&log);
     let config =
         SourceConfig { name: "truth".into(), position: Some(truth.into()), ..SourceConfig::default() };
-    let (truth, truth_origin, _) = source::load(&log, &[config], true).expect("the truth");
+    let (truth, truth_origin, _) = source::load(&log, &[config], true, None).expect("the truth");
     let shift_s = truth_origin.seconds_since(origin);
     let found = registered(&sources, datum, (f64::INFINITY, f64::NEG_INFINITY));
     for unknown in &found.unknowns {

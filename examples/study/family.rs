@@ -193,7 +193,7 @@ fn fuse(climb: &Climb, ask: Ask) -> Fusion {
     ask(&mut config);
     let log = Log::open(&climb.log).expect("a log");
     config.source = source::recognise(&log, &config.output.prefix).expect("sources").sources;
-    let (loaded, origin, _) = source::load(&log, &config.source, false).expect("samples");
+    let (loaded, origin, _) = source::load(&log, &config.source, false, None).expect("samples");
     let sources: Vec<Source> = loaded.iter().map(|l| l.source.clone()).collect();
     let datum = source::datum(&config.source);
     let plan = resolve::plan(&mut config, &loaded, &sources, datum, origin, &mut Vec::new()).expect("a plan");

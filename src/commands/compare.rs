@@ -19,7 +19,8 @@ use crate::time::Time;
 pub fn compare(args: &Compare) -> Result<Outcome, CommandError> {
     let log = Log::open(&args.log)?;
     let estimate = source::recorded(&log, &args.estimate)?;
-    let (mut reference, reference_origin) = source::reference(&log, &args.reference, args.reference_time)?;
+    let (mut reference, reference_origin) =
+        source::reference(&log, &args.reference, args.reference_time, estimate.fix_origin)?;
     let t0 = estimate.origin();
     let shift_s = reference_origin.seconds_since(t0);
     for quantity in Quantity::ALL {

@@ -34,9 +34,10 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
 
     let named = !config.source.is_empty();
     let (unused, mut warnings) = choose_sources(&log, &mut config)?;
-    let (loaded, origin, left_out) = source::load(&log, &config.source, named)?;
+    let (loaded, origin, left_out) = source::load(&log, &config.source, named, config.output.origin)?;
     warnings.extend(left_out);
     config.source = loaded.iter().map(|l| l.config.clone()).collect();
+    config.output.origin = config.output.origin.or(loaded.iter().find_map(|l| l.fix_origin));
     let datum = source::datum(&config.source);
     config.source[datum].datum = true;
     let sources: Vec<Source> = loaded.iter().map(|l| l.source.clone()).collect();
@@ -57,6 +58,7 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         input: &input_name,
         output: &output_name,
         t0,
+        fix_origin: config.output.origin,
         loaded: &loaded,
         datum,
         unused: &unused,

@@ -56,8 +56,11 @@ pub struct Loaded {
     pub config: SourceConfig,
     /// The samples.
     pub source: Source,
-    /// The frame that its messages name first; empty where they don't.
+    /// The frame that its messages name first; empty where they don't. Of latitudes and longitudes `enu`.
     pub frame_id: String,
+    /// Latitude and longitude, degrees, and altitude, m, from which its positions count; `None` where they were
+    /// metres from the beginning.
+    pub fix_origin: Option<[f64; 3]>,
     /// Its clock.
     pub timing: Timing,
     /// Median standard deviation over axes and samples, m and m/s, and where it comes from.
@@ -67,7 +70,8 @@ pub struct Loaded {
 }
 
 /// Loads `configs` in one pass over the log; the origin of the samples' seconds is the median time of the
-/// [`datum`]'s.
+/// [`datum`]'s. Latitudes and longitudes become metres east, north and up of `fix_origin` (degrees and m), by default
+/// the datum's first fix, else that of the first source that has one.
 ///
 /// What gives nothing at all is an error where the user `named` the sources, and else left out while
 /// something remains: the third part of the answer has a sentence on each.
@@ -78,6 +82,7 @@ pub fn load(
     log: &Log,
     configs: &[SourceConfig],
     named: bool,
+    fix_origin: Option<[f64; 3]>,
 ) -> Result<(Vec<Loaded>, Time, Vec<String>), SourceError> {
     let mut gathered = configs.iter().map(Gathered::new).collect::<Result<Vec<_>, _>>()?;
     let mut readers = Readers::default();
@@ -103,8 +108,11 @@ pub fn load(
         return Err(error);
     }
     let kept: Vec<SourceConfig> = gathered.iter().map(|g| g.config.clone()).collect();
-    let origin = gathered.get(datum(&kept)).map_or(Time::from_ns(0), Gathered::median_time);
-    Ok((gathered.into_iter().map(|g| g.finish(origin)).collect(), origin, dropped))
+    let of_datum = gathered.get(datum(&kept));
+    let origin = of_datum.map_or(Time::from_ns(0), Gathered::median_time);
+    let first_fix = || of_datum.into_iter().chain(&gathered).find_map(Gathered::first_fix);
+    let fix_origin = fix_origin.or_else(first_fix);
+    Ok((gathered.into_iter().map(|g| g.finish(origin, fix_origin)).collect(), origin, dropped))
 }
 
 /// Who reads the messages of which channel.
