@@ -21,8 +21,8 @@ WANTED = [
     ("rosbag2/talker.mcap", "/rosout", 9, ["stamp.sec", "msg", "line"]),
     ("rosbag2/only_topics.mcap", "/parameter_events", 6, ["node", "new_parameters[0].name", "new_parameters[0].value.string_value"]),
     ("others/autoferry_s02.mcap", "/lidar/detections", 200, ["header.frame_id", "poses[0].position.x", "poses[-1].position.y"]),
-    ("others/husky_gps_odom_ros1.mcap", "/fix", 500, ["header.seq", "header.stamp.secs", "header.stamp.nsecs", "header.frame_id", "status.status", "latitude", "longitude", "altitude", "position_covariance[8]", "position_covariance_type"]),
-    ("others/husky_gps_odom_ros1.mcap", "/husky_velocity_controller/odom", 2000, ["header.stamp.nsecs", "child_frame_id", "pose.pose.position.x", "pose.pose.orientation.z", "pose.covariance[35]", "twist.twist.linear.x"]),
+    ("others/husky_gps_odom_ros1.mcap", "/fix", 499, ["header.seq", "header.stamp.secs", "header.stamp.nsecs", "header.frame_id", "status.status", "latitude", "longitude", "altitude", "position_covariance[8]", "position_covariance_type"]),
+    ("others/husky_gps_odom_ros1.mcap", "/husky_velocity_controller/odom", 499, ["header.seq", "header.stamp.nsecs", "pose.pose.position.x", "pose.pose.position.y", "pose.pose.orientation.z", "twist.twist.linear.x"]),
     ("climbs/async_0.mcap", "/tether/track", 100, ["timestamp.nsec", "position.x", "velocity.z"]),
     ("others/nbp1406_rv_palmer.mcap", "/knudsen/depth", 4999, None),
 ]
