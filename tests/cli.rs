@@ -13,8 +13,10 @@ mod cli {
     mod compare;
     mod crash;
     mod damaged_chunks;
+    mod encodings;
     mod exit_code;
     mod export;
+    mod fixes;
     mod init;
     mod inspect;
     mod output;

@@ -1,4 +1,4 @@
-"""The numbers in decode.rs, by an independent decoder: `pip install mcap mcap-ros2-support`.
+"""The numbers in decode.rs, by an independent decoder: `pip install mcap mcap-ros1-support mcap-ros2-support`.
 
 Run as `python decode_golden.py DIR`, where DIR is what TRACKFUSE_TEST_DATA names.
 """
@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 from mcap.reader import make_reader
+from mcap_ros1.decoder import DecoderFactory as Ros1DecoderFactory
 from mcap_ros2.decoder import DecoderFactory
 
 # (file, topic, which message, counted from 0 in log-time order, fields)
@@ -20,6 +21,8 @@ WANTED = [
     ("rosbag2/talker.mcap", "/rosout", 9, ["stamp.sec", "msg", "line"]),
     ("rosbag2/only_topics.mcap", "/parameter_events", 6, ["node", "new_parameters[0].name", "new_parameters[0].value.string_value"]),
     ("others/autoferry_s02.mcap", "/lidar/detections", 200, ["header.frame_id", "poses[0].position.x", "poses[-1].position.y"]),
+    ("others/husky_gps_odom_ros1.mcap", "/fix", 499, ["header.seq", "header.stamp.secs", "header.stamp.nsecs", "header.frame_id", "status.status", "latitude", "longitude", "altitude", "position_covariance[8]", "position_covariance_type"]),
+    ("others/husky_gps_odom_ros1.mcap", "/husky_velocity_controller/odom", 499, ["header.seq", "header.stamp.nsecs", "pose.pose.position.x", "pose.pose.position.y", "pose.pose.orientation.z", "twist.twist.linear.x"]),
     ("climbs/async_0.mcap", "/tether/track", 100, ["timestamp.nsec", "position.x", "velocity.z"]),
     ("others/nbp1406_rv_palmer.mcap", "/knudsen/depth", 4999, None),
 ]
@@ -33,7 +36,7 @@ def messages(path, topic):
             if channel.message_encoding == "json":
                 yield json.loads(message.data)
             else:
-                factory = DecoderFactory()
+                factory = Ros1DecoderFactory() if channel.message_encoding == "ros1" else DecoderFactory()
                 schema = reader.get_summary().schemas[channel.schema_id]
                 yield factory.decoder_for(channel.message_encoding, schema)(message.data)
 

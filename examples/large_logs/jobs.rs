@@ -91,7 +91,8 @@ fn fit(input: &Path) -> Fitted {
     let mut config = Config::default();
     let log = Log::open(input).expect("a log");
     config.source = source::recognise(&log, &config.output.prefix).expect("sources").sources;
-    let Samples { mut loaded, origin, .. } = source::load(&log, &config.source, false).expect("samples");
+    let Samples { mut loaded, origin, .. } =
+        source::load(&log, &config.source, false, None).expect("samples");
     let datum = source::datum(&config.source);
     let sources: Vec<Source> = loaded.iter_mut().map(|l| std::mem::take(&mut l.source)).collect();
     let plan = resolve::plan(&mut config, &loaded, &sources, datum, origin, &mut Vec::new()).expect("a plan");

@@ -26,7 +26,8 @@ impl Recording {
     pub(crate) fn open(log: &Path) -> Self {
         let log = Log::open(log).expect("a log");
         let configs = source::recognise(&log, "/fused").expect("sources").sources;
-        let source::Samples { loaded, origin, .. } = source::load(&log, &configs, false).expect("samples");
+        let source::Samples { loaded, origin, .. } =
+            source::load(&log, &configs, false, None).expect("samples");
         Self { loaded, origin }
     }
 }

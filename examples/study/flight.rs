@@ -51,7 +51,7 @@ pub(crate) fn judge(log: &Path) -> Flight {
     let config =
         SourceConfig { name: "truth".into(), position: Some(TRUTH.into()), ..SourceConfig::default() };
     let source::Samples { loaded: truth, origin, .. } =
-        source::load(&log, &[config], true).expect("the truth");
+        source::load(&log, &[config], true, None).expect("the truth");
     let configs: Vec<SourceConfig> = recording.loaded.iter().map(|l| l.config.clone()).collect();
     let datum = source::datum(&configs);
     let errors = [true, false].map(|by_gauge| {

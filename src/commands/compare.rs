@@ -22,7 +22,8 @@ pub fn compare(args: &Compare) -> Result<Outcome, CommandError> {
     let (log, damage) = open(&args.log, args.memory, args.strict, &bar)?;
     let mut estimate = source::recorded(&log, &args.estimate)?;
     estimate.warnings.splice(..0, damage);
-    let (mut reference, reference_origin) = source::reference(&log, &args.reference, args.reference_time)?;
+    let (mut reference, reference_origin) =
+        source::reference(&log, &args.reference, args.reference_time, estimate.fix_origin)?;
     let t0 = estimate.origin();
     let shift_s = reference_origin.seconds_since(t0);
     for quantity in Quantity::ALL {

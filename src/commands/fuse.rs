@@ -48,12 +48,14 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     let named = !config.source.is_empty();
     let (unused, of_sources) = choose_sources(&log, &mut config)?;
     warnings.extend(of_sources);
-    let Samples { mut loaded, origin, left_out, mut read } = source::load(&log, &config.source, named)?;
+    let Samples { mut loaded, origin, left_out, mut read } =
+        source::load(&log, &config.source, named, config.output.origin)?;
     ensure_whole(&mut read, &log, args)?;
     let known = |sentence: &String| warnings.contains(sentence);
     let left_out: Vec<String> = left_out.into_iter().filter(|sentence| !known(sentence)).collect();
     warnings.extend(left_out);
     config.source = loaded.iter().map(|l| l.config.clone()).collect();
+    config.output.origin = config.output.origin.or(loaded.iter().find_map(|l| l.fix_origin));
     let datum = source::datum(&config.source);
     config.source[datum].datum = true;
     // moved: copies would double what millions of samples take
@@ -78,6 +80,7 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         input: &input_name,
         output: &output_name,
         t0,
+        fix_origin: config.output.origin,
         loaded: &loaded,
         sources: &sources,
         unchecked_chunks: read.unchecked,

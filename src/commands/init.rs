@@ -23,7 +23,11 @@ pub fn init(args: &Init) -> Result<Outcome, CommandError> {
     if let Some(output) = &args.output {
         log.ensure_other(output)?;
     }
-    let proposal = source::propose(&log, &Config::default().output.prefix)?;
+    let proposal = if args.source.is_empty() {
+        source::propose(&log, &Config::default().output.prefix)?
+    } else {
+        source::propose_chosen(&log, &args.source)?
+    };
     warnings.extend(proposal.all_warnings());
     drop(bar);
     let input = args.log.display().to_string();

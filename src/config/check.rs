@@ -29,6 +29,15 @@ impl Config {
             format!("{:?}", output.rate_hz.unwrap_or_default()),
             "0.001 to 10000 Hz",
         )?;
+        let origin_ok = |[latitude, longitude, altitude]: [f64; 3]| {
+            latitude.abs() <= 90.0 && longitude.abs() <= 360.0 && altitude.is_finite()
+        };
+        range(
+            output.origin.is_none_or(origin_ok),
+            "output.origin".into(),
+            format!("{:?}", output.origin.unwrap_or_default()),
+            "latitude and longitude in degrees, altitude in m",
+        )?;
         positive("fusion.knot_spacing_s", fusion.knot_spacing_s)?;
         positive("fusion.bridge_max_s", Some(fusion.bridge_max_s))?;
         let orders = 1..=crate::estimate::polynomial::MAX_ORDER;
@@ -104,6 +113,7 @@ mod tests {
             ("[output]\nprefix = \"fused\"", "output.prefix is \"fused\", expected \"/name\""),
             ("[output]\nrate_hz = 0.0", "output.rate_hz is 0.0, expected a positive number"),
             ("[output]\nrate_hz = nan", "output.rate_hz is NaN"),
+            ("[output]\norigin = [91.0, 0.0, 0.0]", "output.origin is [91.0, 0.0, 0.0], expected latitude"),
             ("[fusion]\norder = 49", "fusion.order is 49, expected 1 to 48"),
             ("[extrapolation]\nhorizon_s = -1.0", "extrapolation.horizon_s is -1"),
             ("[[source]]\nname = \"a\"", "source \"a\": position is missing"),

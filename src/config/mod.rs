@@ -96,6 +96,11 @@ pub struct Output {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(example = &"enu")]
     pub frame_id: Option<String>,
+    /// Latitude and longitude, degrees, and altitude, m, of the track's zero (WGS 84): from there latitudes and longitudes
+    /// become metres east, north and up; default: the first fix of the datum, else of the first source that has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = [42.3758, -71.1474, 7.3])]
+    pub origin: Option<[f64; 3]>,
     /// Compression of the new chunks.
     pub compression: Compression,
     /// T0, from which times count, ns; default: the datum's first sample.
@@ -115,6 +120,7 @@ impl Default for Output {
             prefix: "/fused".into(),
             rate_hz: None,
             frame_id: None,
+            origin: None,
             compression: Compression::Zstd,
             t0_ns: None,
             surface_at_zero: None,
@@ -129,7 +135,8 @@ pub struct SourceConfig {
     /// What to call it.
     #[schemars(example = &"tether")]
     pub name: String,
-    /// Message path of its position, m: an object with x, y, z or an array of three.
+    /// Message path of its position: an object with x, y, z or an array of three, m, or one with latitude, longitude,
+    /// degrees, and altitude, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(example = &"/tether/track.position")]
     pub position: Option<String>,
@@ -139,7 +146,7 @@ pub struct SourceConfig {
     pub velocity: Option<String>,
     /// Whether its bias and clock are zero by definition; default: the tether's are, else the first source's.
     pub datum: bool,
-    /// Directions of its x, y and z.
+    /// Directions of its x, y and z; of no meaning for latitudes.
     pub axes: Axes,
     /// Standard deviation of its position, m; default: from the messages, else estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -157,7 +164,7 @@ pub struct SourceConfig {
     pub latency_s: f64,
     /// Added to every position, m: the vector, in the track's frame, from what is measured to what is tracked.
     pub offset_m: [f64; 3],
-    /// Frame of its velocities; default: `body` for `nav_msgs/Odometry`, else `world`.
+    /// Frame of its velocities; default: `body` for `nav_msgs/Odometry` and `foxglove.Odometry`, else `world`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(example = &"world")]
     pub velocity_frame: Option<VelocityFrame>,

@@ -4,6 +4,7 @@ pub mod banded;
 pub mod chebyshev;
 mod elimination;
 pub mod gaussian_basis;
+pub mod geodesy;
 pub mod least_squares;
 pub mod log_histogram;
 pub mod polyline;

@@ -117,6 +117,8 @@ pub struct TrackReport {
     pub coefficients: String,
     /// Frame of the coordinates.
     pub frame_id: String,
+    /// Latitude and longitude, degrees, and altitude, m, of the zero of the coordinates (WGS 84), where they are known.
+    pub origin: Option<[f64; 3]>,
     /// Number of points.
     pub points: usize,
     /// Points a second.
@@ -247,6 +249,8 @@ pub struct Parts<'a> {
     pub output: &'a str,
     /// T0.
     pub t0: Time,
+    /// Latitude and longitude, degrees, and altitude, m, of the track's zero.
+    pub fix_origin: Option<[f64; 3]>,
     /// The sources, whose samples may have been moved to [`Parts::sources`].
     pub loaded: &'a [Loaded],
     /// Their samples, in the same order.
@@ -272,7 +276,19 @@ impl Report {
     #[must_use]
     pub fn new(parts: &Parts<'_>) -> Self {
         let Parts {
-            input, output, t0, loaded, sources, datum, unused, plan, fusion, notes, warnings, ..
+            input,
+            output,
+            t0,
+            fix_origin,
+            loaded,
+            sources,
+            datum,
+            unused,
+            plan,
+            fusion,
+            notes,
+            warnings,
+            ..
         } = *parts;
         let since_t0 = |s: f64| plan.origin.plus_seconds(s).seconds_since(t0);
         let span = |(a, b): (f64, f64)| (since_t0(a), since_t0(b));
@@ -299,6 +315,7 @@ impl Report {
                 method: plan.method.method().name().into(),
                 coefficients: plan.coefficients.name().into(),
                 frame_id: fusion.track.frame_id.clone(),
+                origin: fix_origin,
                 points: points.len(),
                 rate_hz: plan.rate_hz,
                 span_s: (end(points.first()), end(points.last())),

@@ -34,6 +34,13 @@ fn write_page(out: &mut String, report: &Report) -> fmt::Result {
         write!(out, ", frame {:?}", track.frame_id)?;
     }
     writeln!(out)?;
+    if let Some([latitude, longitude, altitude]) = track.origin {
+        writeln!(
+            out,
+            "        metres east, north and up of latitude {latitude:.7}, longitude {longitude:.7} (WGS 84), altitude \
+             {altitude:.2} m"
+        )?;
+    }
     if let Some(registration) = &report.registration {
         let what = if report.sources.len() > 1 { "registered to the datum" } else { "smoothed" };
         writeln!(out, "        {what} in {} steps, {} knots", registration.iterations, registration.knots)?;

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use super::SourceError;
+use super::fix::fix;
 use super::topic::{is_reference, sensor_word, vector_is};
 use crate::log::decode::{Decoder, MessagePath, Value};
 use crate::log::{Index, Log, LogError};
@@ -15,10 +16,12 @@ const OWN_SCHEMAS: [&str; 3] =
     ["trackfuse.TrackPoint", "trackfuse.CharacteristicPoint", "trackfuse.Residual"];
 
 /// Where the usual messages keep a position, the most specific first.
-const POSITION_FIELDS: [&str; 5] = ["pose.pose.position", "pose.position", "position", "point", "vector"];
+const POSITION_FIELDS: [&str; 6] =
+    ["pose.pose.position", "pose.position", "transform.translation", "position", "point", "vector"];
 
 /// Where they keep a velocity.
-const VELOCITY_FIELDS: [&str; 4] = ["twist.twist.linear", "twist.linear", "velocity", "vector"];
+const VELOCITY_FIELDS: [&str; 5] =
+    ["twist.twist.linear", "twist.linear", "linear_velocity", "velocity", "vector"];
 
 /// A channel that could be a source, or a part of one.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -195,7 +198,9 @@ fn fit(topic: &str, message: &Value) -> Result<Candidate, Unfit> {
         let found = fields.iter().find(fits).or_else(|| fields.iter().find(may_fit));
         found.map(|f| format!("{}.{f}", quoted(topic)))
     };
-    let (position, velocity) = (path_of(Quantity::Position), path_of(Quantity::Velocity));
+    // the message itself is a latitude, longitude and altitude
+    let place = || fix(message).map(|_| quoted(topic));
+    let (position, velocity) = (path_of(Quantity::Position).or_else(place), path_of(Quantity::Velocity));
     if position.is_some() || velocity.is_some() {
         Ok(Candidate { topic: topic.to_owned(), position, velocity })
     } else {

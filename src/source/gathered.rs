@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 
 use super::SourceError;
 use super::load::{Loaded, SigmaOrigin, Timing};
-use super::reading::{Clock, Fault, Outcome, Reading};
+use super::reading::{Clock, Fault, Measured, Outcome, Reading};
 use crate::config::SourceConfig;
 use crate::estimate::noise;
 use crate::log::decode::{DecodeError, MessagePath};
+use crate::math::geodesy::{Geodetic, LocalFrame};
 use crate::math::robust;
 use crate::printable::printable;
 use crate::sample::{Quantity, Sample, Source};
@@ -158,17 +159,39 @@ impl Gathered {
         if times.is_empty() { Time::from_ns(0) } else { *times.select_nth_unstable(middle).1 }
     }
 
-    pub(super) fn finish(mut self, origin: Time) -> Loaded {
+    /// The earliest latitude, longitude and altitude: degrees and m.
+    pub(super) fn first_fix(&self) -> Option<[f64; 3]> {
+        let fixes = self.readings.iter().flatten().filter_map(|reading| match reading.value {
+            Measured::Fix(place) => Some((reading.time, place)),
+            Measured::Vector(_) => None,
+        });
+        fixes.min_by_key(|(time, _)| *time).map(|(_, place)| place.to_degrees())
+    }
+
+    /// The samples; latitudes and longitudes count from `fix_origin` (degrees and m).
+    pub(super) fn finish(mut self, origin: Time, fix_origin: Option<[f64; 3]>) -> Loaded {
         let warnings = self.warnings();
+        let fix_origin = fix_origin.filter(|_| self.first_fix().is_some());
+        let local = LocalFrame::new(Geodetic::from_degrees(fix_origin.unwrap_or_default()));
+        let offset_m = self.config.offset_m;
         let mut source = Source { name: self.config.name.clone(), ..Source::default() };
         let mut sigma = [None, None];
         for quantity in Quantity::ALL {
             let readings = std::mem::take(&mut self.readings[quantity as usize]);
+            let value = |reading: &Reading| {
+                let value = match reading.value {
+                    Measured::Vector(value) => value,
+                    Measured::Fix(place) => local.to_enu(place),
+                };
+                let is_position = quantity == Quantity::Position;
+                if is_position { std::array::from_fn(|i| value[i] + offset_m[i]) } else { value }
+            };
             let configured = match quantity {
                 Quantity::Position => self.config.position_sigma_m,
                 Quantity::Velocity => self.config.velocity_sigma_m_s,
             };
-            (*source.series_mut(quantity), sigma[quantity as usize]) = samples(readings, origin, configured);
+            (*source.series_mut(quantity), sigma[quantity as usize]) =
+                samples(readings, value, origin, configured);
         }
         let names = ["stamp", "publish", "log"];
         let used: Vec<&str> =
@@ -187,7 +210,9 @@ impl Gathered {
         Loaded {
             config: self.config.clone(),
             source,
-            frame_id: self.frame_id.unwrap_or_default(),
+            // the frame that a fix names is the receiver's, not the one its metres are in
+            frame_id: fix_origin.map_or(self.frame_id.unwrap_or_default(), |_| "enu".to_owned()),
+            fix_origin,
             timing,
             sigma,
             warnings,
@@ -231,6 +256,8 @@ impl Fault {
             Self::Miss(_) => Some("the path leads nowhere in them"),
             Self::NoVector { .. } => Some("no vector at the path"),
             Self::NotFinite => Some("NaN or infinite"),
+            Self::NoFix => Some("their status is that there is no fix"),
+            Self::OffEarth => Some("a latitude beyond 90 degrees or a longitude beyond 360"),
             Self::NoOrientation => Some("no orientation of unit length to turn the velocity by"),
             Self::Filtered => None,
         }
@@ -240,14 +267,19 @@ impl Fault {
 type Sigma = Option<(f64, SigmaOrigin)>;
 
 /// Readings in order of time with a sigma each, and the median sigma with its origin.
-fn samples(mut readings: Vec<Reading>, origin: Time, configured: Option<f64>) -> (Vec<Sample>, Sigma) {
+fn samples(
+    mut readings: Vec<Reading>,
+    value: impl Fn(&Reading) -> [f64; 3],
+    origin: Time,
+    configured: Option<f64>,
+) -> (Vec<Sample>, Sigma) {
     readings.sort_by_key(|r| r.time);
     let from_messages = readings.iter().any(|r| r.sigma.is_some());
     let mut samples: Vec<Sample> = readings
         .iter()
         .map(|r| Sample {
             time_s: r.time.seconds_since(origin),
-            value: r.value,
+            value: value(r),
             sigma: configured.map_or(r.sigma.unwrap_or([f64::NAN; 3]), |s| [s; 3]),
         })
         .collect();

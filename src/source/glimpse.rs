@@ -61,7 +61,8 @@ impl Glimpse {
         }
         let seen = (!source.paths.is_empty()).then(|| {
             let origin = source.median_time();
-            source.finish(origin)
+            let fix_origin = source.first_fix();
+            source.finish(origin, fix_origin)
         });
         Self { messages, seen, lacks, refused: false }
     }

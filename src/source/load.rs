@@ -56,8 +56,11 @@ pub struct Loaded {
     pub config: SourceConfig,
     /// The samples.
     pub source: Source,
-    /// The frame that its messages name first; empty where they don't.
+    /// The frame that its messages name first; empty where they don't. Of latitudes and longitudes `enu`.
     pub frame_id: String,
+    /// Latitude and longitude, degrees, and altitude, m, from which its positions count; `None` where they were
+    /// metres from the beginning.
+    pub fix_origin: Option<[f64; 3]>,
     /// Its clock.
     pub timing: Timing,
     /// Median standard deviation over axes and samples, m and m/s, and where it comes from.
@@ -79,14 +82,20 @@ pub struct Samples {
     pub read: MessagesRead,
 }
 
-/// Loads `configs` in one pass over the log.
+/// Loads `configs` in one pass over the log. Latitudes and longitudes become metres east, north and up of
+/// `fix_origin` (degrees and m), by default the datum's first fix, else that of the first source that has one.
 ///
 /// What gives nothing at all is an error where the user `named` the sources, and else left out while
 /// something remains. Damaged parts of the log are left out.
 ///
 /// # Errors
 /// [`SourceError`] for a path or topic that doesn't fit, and for a source without a single sample.
-pub fn load(log: &Log, configs: &[SourceConfig], named: bool) -> Result<Samples, SourceError> {
+pub fn load(
+    log: &Log,
+    configs: &[SourceConfig],
+    named: bool,
+    fix_origin: Option<[f64; 3]>,
+) -> Result<Samples, SourceError> {
     let mut gathered = configs.iter().map(Gathered::new).collect::<Result<Vec<_>, _>>()?;
     let mut readers = Readers::default();
     for (i, source) in gathered.iter().enumerate() {
@@ -122,8 +131,11 @@ pub fn load(log: &Log, configs: &[SourceConfig], named: bool) -> Result<Samples,
         return Err(error);
     }
     let kept: Vec<SourceConfig> = gathered.iter().map(|g| g.config.clone()).collect();
-    let origin = gathered.get(datum(&kept)).map_or(Time::from_ns(0), Gathered::median_time);
-    let loaded = gathered.into_iter().map(|g| g.finish(origin)).collect();
+    let of_datum = gathered.get(datum(&kept));
+    let origin = of_datum.map_or(Time::from_ns(0), Gathered::median_time);
+    let first_fix = || of_datum.into_iter().chain(&gathered).find_map(Gathered::first_fix);
+    let fix_origin = fix_origin.or_else(first_fix);
+    let loaded = gathered.into_iter().map(|g| g.finish(origin, fix_origin)).collect();
     Ok(Samples { loaded, origin, left_out, read })
 }
 

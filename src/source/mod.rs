@@ -5,6 +5,7 @@
 //! is one way in.
 
 mod candidate;
+mod fix;
 mod gathered;
 mod glimpse;
 mod load;
@@ -17,7 +18,7 @@ mod topic;
 pub use candidate::{Candidate, Judged, Judgement, Unfit, judge};
 pub use glimpse::{Glimpse, glimpse};
 pub use load::{Loaded, Samples, SigmaOrigin, Timing, datum, load};
-pub use propose::{Proposal, propose};
+pub use propose::{Proposal, propose, propose_chosen};
 pub use recognise::{Choice, Recognised, choices_of, recognise};
 pub use recorded::{Recorded, recorded, reference};
 pub use topic::is_datum_like;
@@ -254,7 +255,10 @@ impl SourceError {
 
 fn choose_hint(log: &str) -> String {
     let init = init_line(Path::new(log));
-    format!("`{init}` writes a config that lists them: choose there, and pass it with `--config`")
+    format!(
+        "`{init}` writes a config that lists them: choose there, and pass it with `--config`; with `--source TOPIC` for \
+         each, the datum first, it is chosen at once"
+    )
 }
 
 /// The command that writes a config for a log, beside it.

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use super::candidate::of_topic;
+use super::recognise::source_of;
 use super::{
     Ambiguity, Candidate, Recognised, Samples, SourceError, choices_of, datum, glimpse, is_datum_like, load,
     recognise,
@@ -62,12 +64,31 @@ pub fn propose(log: &Log, prefix: &str) -> Result<Proposal, SourceError> {
         }
         Err(other) => return Err(other),
     };
+    checked(log, &recognised)
+}
+
+/// The sources of the topics that a person chose, the datum first.
+///
+/// # Errors
+/// [`SourceError::NoTopic`], [`SourceError::Decode`], [`SourceError::NoVectors`] for a topic that can't be one;
+/// [`SourceError::Log`].
+pub fn propose_chosen(log: &Log, topics: &[String]) -> Result<Proposal, SourceError> {
+    let candidates: Vec<Candidate> = topics.iter().map(|t| of_topic(log, t)).collect::<Result<_, _>>()?;
+    let mut sources: Vec<SourceConfig> = choices_of(&candidates).iter().map(source_of).collect();
+    if let Some(first) = sources.first_mut() {
+        first.datum = true;
+    }
+    checked(log, &Recognised { sources, unused: Vec::new(), warnings: Vec::new(), bad_chunks: std::collections::BTreeSet::new() })
+}
+
+/// The sources with what stands against them.
+fn checked(log: &Log, recognised: &Recognised) -> Result<Proposal, SourceError> {
     match kept(log, &recognised.sources) {
-        Ok((sources, left_out)) => Ok(Proposal::of(&recognised, &sources, left_out)),
+        Ok((sources, left_out)) => Ok(Proposal::of(recognised, &sources, left_out)),
         Err(error @ SourceError::Log(_)) => Err(error),
         // What stands against one of the sources stands against `fuse` without a config too.
         Err(error) => {
-            let mut proposal = Proposal::of(&recognised, &recognised.sources, Vec::new());
+            let mut proposal = Proposal::of(recognised, &recognised.sources, Vec::new());
             proposal.tables.iter_mut().for_each(|table| table.commented = true);
             proposal.undecided = Some(error.to_string());
             Ok(proposal)
@@ -82,7 +103,7 @@ fn kept(log: &Log, sources: &[SourceConfig]) -> Result<(Vec<SourceConfig>, Vec<S
     if excerpt.damaged.is_empty() && glimpses.iter().all(|g| g.lacks.is_empty()) {
         return Ok((sources.to_vec(), Vec::new()));
     }
-    let Samples { loaded, left_out, .. } = load(log, sources, false)?;
+    let Samples { loaded, left_out, .. } = load(log, sources, false, None)?;
     let mut kept: Vec<SourceConfig> = loaded.into_iter().map(|l| l.config).collect();
     let datum = datum(&kept);
     if let Some(source) = kept.get_mut(datum) {

@@ -1,19 +1,48 @@
 //! One channel's messages as readings: which fields hold the time, the vectors and their covariances.
 
 use super::SourceError;
+use super::fix::{covariance_is_unknown, fix};
 use crate::config::{Axes, SourceConfig, TimeChoice, VelocityFrame};
 use crate::log::decode::{DecodeError, Decoder, MessagePath, PathMiss, Step, Value};
 use crate::log::{Channel, Index, Message};
+use crate::math::geodesy::Geodetic;
 use crate::sample::Quantity;
 use crate::time::Time;
+
+/// Types whose velocities are in the frame of the body, by definition.
+const BODY_BY_TYPE: [&str; 6] = [
+    "nav_msgs/msg/Odometry",
+    "nav_msgs/Odometry",
+    "foxglove.Odometry",
+    "foxglove::Odometry",
+    "foxglove_msgs/msg/Odometry",
+    "foxglove_msgs/Odometry",
+];
+
+/// Where messages keep an orientation, for velocities whose position is not used.
+const ORIENTATIONS: [&[&str]; 4] = [
+    &["pose", "pose", "orientation"],
+    &["pose", "orientation"],
+    &["orientation"],
+    &["transform", "rotation"],
+];
 
 /// A vector as a message gave it, in the track's axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Reading {
     pub(super) time: Time,
-    pub(super) value: [f64; 3],
+    pub(super) value: Measured,
     /// From the message's covariance, where it gives one.
     pub(super) sigma: Option<[f64; 3]>,
+}
+
+/// What a message says of a place or a velocity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Measured {
+    /// Metres or m/s along the track's axes.
+    Vector([f64; 3]),
+    /// A place on the earth.
+    Fix(Geodetic),
 }
 
 /// Which of the three times of a message counted.
@@ -50,6 +79,10 @@ pub(super) enum Fault {
     NotFinite,
     /// A filter in the path turned the message down; nothing is wrong with it.
     Filtered,
+    /// The receiver says that it has no fix.
+    NoFix,
+    /// A latitude or longitude that there is not.
+    OffEarth,
     /// A body-frame velocity without an orientation of unit length beside it.
     NoOrientation,
 }
@@ -64,7 +97,6 @@ pub(super) struct Reader {
     time: Option<TimeChoice>,
     latency_s: f64,
     axes: Axes,
-    offset_m: [f64; 3],
 }
 
 /// One vector that the messages hold.
@@ -74,8 +106,8 @@ struct Vector {
     path: MessagePath,
     /// Where its covariance may stand: the path, and the stride of the diagonal.
     covariances: Vec<MessagePath>,
-    /// Where the orientation stands that turns it, for body-frame velocities.
-    orientation: Option<MessagePath>,
+    /// Where the orientation may stand that turns it, for body-frame velocities; empty for others.
+    orientations: Vec<MessagePath>,
 }
 
 impl Reader {
@@ -103,25 +135,27 @@ impl Reader {
         let (stamps, frames): (Vec<_>, Vec<_>) =
             (stamps.into_iter().filter(known).collect(), frames.into_iter().filter(known).collect());
 
-        let body_by_type = ["nav_msgs/msg/Odometry", "nav_msgs/Odometry"].contains(&schema_name);
-        let by_type = if body_by_type { VelocityFrame::Body } else { VelocityFrame::World };
+        let by_type =
+            if BODY_BY_TYPE.contains(&schema_name) { VelocityFrame::Body } else { VelocityFrame::World };
         let body = config.velocity_frame.unwrap_or(by_type) == VelocityFrame::Body;
         let mut vectors = Vec::new();
         for (quantity, path) in paths.iter().filter(|(_, path)| path.topic == channel.topic) {
             let position = paths.iter().find(|(q, p)| *q == Quantity::Position && p.topic == channel.topic);
-            let orientation = position
-                .filter(|_| body && *quantity == Quantity::Velocity)
-                .and_then(|(_, position)| sibling(position, 1, "orientation"))
-                .filter(known);
-            if body && *quantity == Quantity::Velocity && orientation.is_none() {
+            let is_turned = body && *quantity == Quantity::Velocity;
+            let beside = |name| position.and_then(|(_, position)| sibling(position, 1, name));
+            let usual = || ORIENTATIONS.iter().filter(|_| position.is_none()).map(|fields| root(fields));
+            let orientations: Vec<_> =
+                ["orientation", "rotation"].into_iter().filter_map(beside).chain(usual()).collect();
+            let orientations: Vec<_> = orientations.into_iter().filter(|p| is_turned && known(p)).collect();
+            if is_turned && orientations.is_empty() {
                 let (name, path) = (config.name.clone(), path.to_string());
                 return Err(SourceError::NoOrientation { name, path });
             }
             let covariances = covariances(path).into_iter().filter(known).collect();
-            vectors.push(Vector { quantity: *quantity, path: path.clone(), covariances, orientation });
+            vectors.push(Vector { quantity: *quantity, path: path.clone(), covariances, orientations });
         }
         let mut wanted: Vec<MessagePath> = vectors.iter().map(|v| v.path.clone()).collect();
-        wanted.extend(vectors.iter().flat_map(|v| v.covariances.iter().chain(&v.orientation)).cloned());
+        wanted.extend(vectors.iter().flat_map(|v| v.covariances.iter().chain(&v.orientations)).cloned());
         wanted.extend(stamps.iter().chain(&frames).cloned());
         let decoder =
             whole.select(&wanted).map_err(|miss| SourceError::Miss { name: config.name.clone(), miss })?;
@@ -133,7 +167,6 @@ impl Reader {
             time: config.time,
             latency_s: config.latency_s,
             axes: config.axes,
-            offset_m: config.offset_m,
         })
     }
 
@@ -174,14 +207,19 @@ impl Reader {
 
     fn vector(&self, vector: &Vector, message: &Value, time: Time) -> Result<Reading, Fault> {
         let at = vector.path.resolve(message).map_err(Fault::Miss)?.ok_or(Fault::Filtered)?;
-        let mut value = at.as_vector3().ok_or_else(|| no_vector(&vector.path, at))?;
         let mut sigma = vector
             .covariances
             .iter()
             .find_map(|path| diagonal(&path.resolve(message).ok()??.as_numbers()?))
             .map(|variances| variances.map(f64::sqrt));
-        if let Some(path) = &vector.orientation {
-            let turn = path.resolve(message).ok().flatten().and_then(rotation).ok_or(Fault::NoOrientation)?;
+        if let (Quantity::Position, Some(place)) = (vector.quantity, fix(at)) {
+            let sigma = sigma.filter(|_| !covariance_is_unknown(at));
+            return Ok(Reading { time, value: Measured::Fix(place?), sigma });
+        }
+        let mut value = at.as_vector3().ok_or_else(|| no_vector(&vector.path, at))?;
+        if !vector.orientations.is_empty() {
+            let turn = |path: &MessagePath| path.resolve(message).ok().flatten().and_then(rotation);
+            let turn = vector.orientations.iter().find_map(turn).ok_or(Fault::NoOrientation)?;
             value = turn(value);
             // turned, the axes mix: one sigma for all keeps the total
             sigma = sigma.map(|s| [(s.iter().map(|s| s * s).sum::<f64>() / 3.0).sqrt(); 3]);
@@ -190,11 +228,8 @@ impl Reader {
             value = [value[1], value[0], -value[2]];
             sigma = sigma.map(|s| [s[1], s[0], s[2]]);
         }
-        if vector.quantity == Quantity::Position {
-            value = std::array::from_fn(|i| value[i] + self.offset_m[i]);
-        }
         if value.iter().all(|v| v.is_finite()) {
-            Ok(Reading { time, value, sigma })
+            Ok(Reading { time, value: Measured::Vector(value), sigma })
         } else {
             Err(Fault::NotFinite)
         }
@@ -208,15 +243,27 @@ fn no_vector(path: &MessagePath, found: &Value) -> Fault {
     Fault::NoVector { kind: found.kind(), fits: deeper.map(|p| p.to_string()).collect() }
 }
 
-/// Where a message may keep the covariance of the vector at `path`: `pose.covariance` for
-/// `pose.pose.position`, `position_covariance` beside `position`.
+/// Where a message may keep the covariance of the vector at `path`: `pose.covariance` for `pose.pose.position`,
+/// `position_covariance` beside `position`, `pose_covariance` beside the `pose` of `pose.position`,
+/// `velocity_covariance` beside `linear_velocity`, and `position_covariance` in a fix.
 fn covariances(path: &MessagePath) -> Vec<MessagePath> {
     let own_name = match path.steps.last() {
         Some(Step::Field(name)) => Some(format!("{name}_covariance")),
         _ => None,
     };
-    let beside = own_name.and_then(|name| sibling(path, 1, &name));
-    beside.into_iter().chain(sibling(path, 2, "covariance")).collect()
+    let of_parent = match path.steps.iter().rev().nth(1) {
+        Some(Step::Field(name)) => sibling(path, 2, &format!("{name}_covariance")),
+        _ => None,
+    };
+    let of_velocity = own_name.as_deref() == Some("linear_velocity_covariance");
+    let places = [
+        own_name.and_then(|name| sibling(path, 1, &name)),
+        sibling(path, 2, "covariance"),
+        of_parent,
+        of_velocity.then(|| sibling(path, 1, "velocity_covariance")).flatten(),
+        sibling(path, 0, "position_covariance").filter(|_| path.steps.is_empty()),
+    ];
+    places.into_iter().flatten().collect()
 }
 
 /// The path with its last `up` steps replaced by the field `name`; `None` where it has fewer.
@@ -262,8 +309,15 @@ mod tests {
     fn covariances_are_looked_for_where_the_usual_messages_keep_them() {
         let found: Vec<String> =
             covariances(&path("/odom.pose.pose.position")).iter().map(ToString::to_string).collect();
-        assert_eq!(found, ["/odom.pose.pose.position_covariance", "/odom.pose.covariance"]);
-        assert_eq!(covariances(&path("/t.position")).len(), 1);
+        assert_eq!(
+            found,
+            ["/odom.pose.pose.position_covariance", "/odom.pose.covariance", "/odom.pose.pose_covariance"]
+        );
+        let found = |text: &str| covariances(&path(text)).iter().map(ToString::to_string).collect::<Vec<_>>();
+        assert_eq!(found("/t.position"), ["/t.position_covariance"]);
+        assert!(found("/t.pose.position").contains(&"/t.pose_covariance".to_owned()));
+        assert!(found("/t.linear_velocity").contains(&"/t.velocity_covariance".to_owned()));
+        assert_eq!(found("/fix"), ["/fix.position_covariance"]);
     }
 
     #[test]

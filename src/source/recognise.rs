@@ -160,7 +160,8 @@ fn datum_among(choices: &[Choice]) -> Result<usize, String> {
     }
 }
 
-fn source_of(choice: &Choice) -> SourceConfig {
+/// A choice as a source, of several paths the first.
+pub(super) fn source_of(choice: &Choice) -> SourceConfig {
     SourceConfig {
         name: choice.name.clone(),
         position: choice.positions.first().cloned(),

@@ -29,6 +29,8 @@ pub struct Recorded {
     pub has_phases: bool,
     /// T0 as the log's metadata has it for this track.
     pub t0: Option<Time>,
+    /// Latitude and longitude, degrees, and altitude, m, of its zero, where they are known.
+    pub fix_origin: Option<[f64; 3]>,
     /// Topics that the track was made of, as the metadata has them.
     pub made_of: Vec<String>,
     /// What a person must read, a sentence each.
@@ -56,6 +58,7 @@ pub fn recorded(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
 }
 
 /// Reads what a track is to be held against: topics, or message paths of a position and of a velocity.
+/// Latitudes and longitudes count from `fix_origin`, which is the track's.
 ///
 /// # Errors
 /// [`SourceError`], as [`load`]; [`SourceError::NoVectors`] for a topic that holds neither;
@@ -64,6 +67,7 @@ pub fn reference(
     log: &Log,
     given: &[String],
     time: Option<TimeChoice>,
+    fix_origin: Option<[f64; 3]>,
 ) -> Result<(Loaded, Time), SourceError> {
     let name = given.join(", ");
     let mut config = SourceConfig { name: name.clone(), time, ..SourceConfig::default() };
@@ -94,7 +98,7 @@ pub fn reference(
             }
         }
     }
-    let Samples { mut loaded, origin, left_out, .. } = load(log, &[config], true)?;
+    let Samples { mut loaded, origin, left_out, .. } = load(log, &[config], true, fix_origin)?;
     let mut one = loaded.pop().ok_or(SourceError::Empty { name, topic: given.join(", ") })?;
     one.warnings.splice(..0, left_out);
     Ok((one, origin))
@@ -186,6 +190,7 @@ fn own_track(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
         sources: names.list,
         has_phases: true,
         t0: t0_of(&metadata),
+        fix_origin: config_of(&metadata).output.origin,
         made_of: topics_of(&metadata),
         warnings,
     })
@@ -239,21 +244,34 @@ fn t0_of(metadata: &BTreeMap<String, String>) -> Option<Time> {
     report.get("t0_ns")?.as_str()?.parse().ok().map(Time::from_ns)
 }
 
+/// What is read of the config in the metadata.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct MadeWith {
+    source: Vec<Paths>,
+    output: Place,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct Paths {
+    position: Option<String>,
+    velocity: Option<String>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct Place {
+    origin: Option<[f64; 3]>,
+}
+
+fn config_of(metadata: &BTreeMap<String, String>) -> MadeWith {
+    toml::from_str(metadata.get("config").map_or("", String::as_str)).unwrap_or_default()
+}
+
 /// The topics of the sources in the metadata's config.
 fn topics_of(metadata: &BTreeMap<String, String>) -> Vec<String> {
-    #[derive(Default, Deserialize)]
-    struct Config {
-        #[serde(default)]
-        source: Vec<Paths>,
-    }
-    #[derive(Deserialize)]
-    struct Paths {
-        position: Option<String>,
-        velocity: Option<String>,
-    }
-    let text = metadata.get("config").map_or("", String::as_str);
-    let config: Config = toml::from_str(text).unwrap_or_default();
-    topics_among(config.source.into_iter().flat_map(|s| [s.position, s.velocity]))
+    topics_among(config_of(metadata).source.into_iter().flat_map(|s| [s.position, s.velocity]))
 }
 
 /// The topics of message paths.
@@ -264,7 +282,7 @@ fn topics_among(paths: impl IntoIterator<Item = Option<String>>) -> Vec<String> 
 
 /// A channel of another's making as a track: its positions, with the velocities at their instants.
 fn foreign_track(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
-    let (loaded, origin) = reference(log, &[topic.to_owned()], None)?;
+    let (loaded, origin) = reference(log, &[topic.to_owned()], None, None)?;
     let velocities = &loaded.source.velocities;
     let gap_s = max_gap_s(velocities);
     let unknown = [f64::NAN; 3];
@@ -291,6 +309,7 @@ fn foreign_track(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
         sources: vec![topic.to_owned()],
         has_phases: false,
         t0: None,
+        fix_origin: loaded.fix_origin,
         made_of: topics_among([loaded.config.position, loaded.config.velocity]),
         warnings: loaded.warnings,
     })

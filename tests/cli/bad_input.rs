@@ -286,7 +286,7 @@ fn bad_input_of_a_whole_sensor_drops_it_with_a_warning_unless_the_config_names_i
         log.channel("/beacon/track", "protobuf", ("x.Track", "protobuf", "?"));
         log.raw("/beacon/track", [EPOCH_NS; 2], b"?");
     });
-    for (log, why) in [(&empty, "null in all 100 messages"), (&unreadable, "\"protobuf\" is not supported")] {
+    for (log, why) in [(&empty, "null in all 100 messages"), (&unreadable, "protobuf descriptor: ")] {
         let (report, output) = Trial::of(log).report(3);
         assert_eq!(report["sources"].as_array().unwrap().len(), 1);
         assert_says(report["warnings"][0].as_str().unwrap(), &["beacon", why]);

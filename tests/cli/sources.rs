@@ -67,7 +67,7 @@ fn sources_are_never_what_a_topic_calls_truth_reference_ins_or_gt() {
 fn sources_that_nothing_offers_are_an_error_that_says_what_there_is() {
     let mut log = TrialLog::new();
     log.json("/imu", 0.0, &json!({"gyro": 1}));
-    log.channel("/odom", "ros1", ("nav_msgs/Odometry", "ros1msg", "float64 x"));
+    log.channel("/odom", "flatbuffer", ("Odometry", "flatbuffer", "?"));
     log.raw("/odom", [ns(0.0); 2], &[0; 8]);
     log.channel("/silent", "json", ("", "", ""));
     let error = Trial::of(log.finish()).error(2);
@@ -78,7 +78,7 @@ fn sources_that_nothing_offers_are_an_error_that_says_what_there_is() {
             "/imu",
             "no position or velocity",
             "/odom",
-            "\"ros1\" is not supported",
+            "\"flatbuffer\" is not supported",
             "/silent",
             "no messages",
         ],

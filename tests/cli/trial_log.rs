@@ -55,7 +55,13 @@ impl TrialLog {
     /// A channel; JSON topics need none.
     pub(crate) fn channel(&mut self, topic: &str, encoding: &str, schema: (&str, &str, &str)) {
         let (name, schema_encoding, data) = schema;
-        let schema = self.writer.add_schema(name, schema_encoding, data.as_bytes()).unwrap();
+        self.channel_of(topic, encoding, (name, schema_encoding, data.as_bytes()));
+    }
+
+    /// A channel whose schema is no text.
+    pub(crate) fn channel_of(&mut self, topic: &str, encoding: &str, schema: (&str, &str, &[u8])) {
+        let (name, schema_encoding, data) = schema;
+        let schema = self.writer.add_schema(name, schema_encoding, data).unwrap();
         let id = self.writer.add_channel(schema, topic, encoding, &BTreeMap::new()).unwrap();
         self.channels.insert(topic.into(), id);
     }

@@ -1,8 +1,8 @@
 //! The layout of a message type: a tree of structs, whatever language it was defined in.
 //!
 //! A parser hands over a [`RawDefinition`], whose types name each other; [`resolve`] links them. The result is
-//! finite: no type holds itself, nesting ends at [`MAX_DEPTH`], and every element takes at least one byte, so
-//! that the bytes of a message bound what is allocated for it.
+//! finite: no type holds itself, nesting ends at [`MAX_DEPTH`], and what is known of the least size of every
+//! element lets the bytes of a message bound what is allocated for it.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -16,8 +16,12 @@ pub(super) const MAX_DEPTH: usize = 32;
 #[derive(Debug)]
 pub(super) struct Struct {
     pub(super) fields: Vec<Field>,
-    /// Bytes that a value takes at the least, without padding; never 0.
+    /// Bytes that a value takes at the least, without padding; 0 only for a ROS 1 type without content.
     pub(super) least_size: usize,
+    /// Whether it has no fields, or only such as take no bytes.
+    pub(super) has_no_content: bool,
+    /// Whether there is a `wstring` anywhere in it.
+    pub(super) has_wide_text: bool,
     depth: usize,
 }
 
@@ -78,6 +82,13 @@ impl Element {
 }
 
 impl Field {
+    fn has_wide_text(&self) -> bool {
+        match &self.element {
+            Element::Struct(inner) => inner.has_wide_text,
+            element => matches!(element, Element::WideText),
+        }
+    }
+
     fn depth(&self) -> usize {
         match &self.element {
             Element::Struct(inner) => inner.depth,
@@ -104,7 +115,7 @@ pub(super) struct RawDefinition {
 /// A struct as its text has it: the types of its fields are still names.
 #[derive(Debug)]
 pub(super) struct RawStruct {
-    /// `package/Type`, or `Type` where the text names no package.
+    /// `package/Type`, or `Type` where the text names no package; in IDL all modules, `package/msg/Type`.
     pub(super) name: String,
     pub(super) fields: Vec<RawField>,
 }
@@ -116,7 +127,7 @@ pub(super) struct RawField {
     pub(super) shape: Shape,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) enum RawElement {
     Scalar(Scalar),
     Text,
@@ -124,18 +135,20 @@ pub(super) enum RawElement {
     Named(String),
 }
 
-/// Links the types that `root` is made of; of two types with one name the first counts.
+/// Links the types that `root` is made of; of two types with one name the first counts. A struct without fields
+/// takes `empty_size` bytes: 0, or 1 as in CDR, where it is given a member that has no name.
 ///
 /// # Errors
 /// [`DecodeError::MissingType`], [`DecodeError::CyclicType`], [`DecodeError::DeepType`].
-pub(super) fn resolve(definition: &RawDefinition) -> Result<Arc<Struct>, DecodeError> {
+pub(super) fn resolve(definition: &RawDefinition, empty_size: usize) -> Result<Arc<Struct>, DecodeError> {
     let mut by_name = HashMap::new();
     let mut by_short_name = HashMap::new();
     for raw in std::iter::once(&definition.root).chain(&definition.others) {
         by_name.entry(raw.name.as_str()).or_insert(raw);
         by_short_name.entry(short(&raw.name)).or_insert(raw);
     }
-    Linker { by_name, by_short_name, done: HashMap::new(), open: Vec::new() }.link(&definition.root)
+    Linker { by_name, by_short_name, empty_size, done: HashMap::new(), open: Vec::new() }
+        .link(&definition.root)
 }
 
 fn short(name: &str) -> &str {
@@ -145,6 +158,7 @@ fn short(name: &str) -> &str {
 struct Linker<'r> {
     by_name: HashMap<&'r str, &'r RawStruct>,
     by_short_name: HashMap<&'r str, &'r RawStruct>,
+    empty_size: usize,
     done: HashMap<&'r str, Arc<Struct>>,
     open: Vec<&'r str>,
 }
@@ -170,10 +184,11 @@ impl<'r> Linker<'r> {
         if depth > MAX_DEPTH {
             return Err(too_deep());
         }
-        // A struct without fields has one byte, `structure_needs_at_least_one_member`.
-        let least_size =
-            fields.iter().fold(0_usize, |sum, field| sum.saturating_add(field.least_size())).max(1);
-        let linked = Arc::new(Struct { fields, least_size, depth });
+        let content = fields.iter().fold(0_usize, |sum, field| sum.saturating_add(field.least_size()));
+        let has_no_content = content == 0;
+        let least_size = content.max(self.empty_size);
+        let has_wide_text = fields.iter().any(Field::has_wide_text);
+        let linked = Arc::new(Struct { fields, least_size, has_no_content, has_wide_text, depth });
         self.done.insert(&raw.name, Arc::clone(&linked));
         Ok(linked)
     }
@@ -195,13 +210,18 @@ impl<'r> Linker<'r> {
         Ok(Field { name: field.name.as_str().into(), element, shape: field.shape })
     }
 
-    /// A name without a package means the package that it stands in, else any that has such a type.
+    /// A name is looked for beside its parent, then in each of the scopes around that; one without a package means
+    /// any type of that name where none is nearer.
     fn find(&self, parent: &RawStruct, name: &str) -> Option<&'r RawStruct> {
-        if name.contains('/') {
-            return self.by_name.get(name).copied();
+        let mut scope = parent.name.as_str();
+        while let Some((outer, _)) = scope.rsplit_once('/') {
+            if let Some(found) = self.by_name.get(format!("{outer}/{name}").as_str()) {
+                return Some(found);
+            }
+            scope = outer;
         }
-        let beside = parent.name.rsplit_once('/').map(|(package, _)| format!("{package}/{name}"));
-        let beside = beside.and_then(|full| self.by_name.get(full.as_str()));
-        beside.or_else(|| self.by_short_name.get(name)).copied()
+        let global = self.by_name.get(name);
+        let any = || if name.contains('/') { None } else { self.by_short_name.get(name) };
+        global.or_else(any).copied()
     }
 }

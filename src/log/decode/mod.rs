@@ -7,16 +7,23 @@
 
 mod cdr;
 mod definition;
+mod idl;
+mod idl_text;
 mod json;
+mod msg;
 mod path;
 mod path_text;
-mod ros2;
+mod protobuf;
+mod reader;
+mod ros1;
 mod selection;
 mod value;
 
 use std::sync::Arc;
 
-use definition::Struct;
+use definition::{RawDefinition, Struct};
+use msg::Dialect;
+use protobuf::Message;
 use selection::Pick;
 
 pub use path::{Comparison, Filter, Literal, MessagePath, PathMiss, Step};
@@ -33,6 +40,8 @@ pub struct Decoder {
 enum Format {
     Json,
     Cdr { root: Arc<Struct>, pick: Pick },
+    Ros1 { root: Arc<Struct>, pick: Pick },
+    Protobuf(Message),
 }
 
 impl Decoder {
@@ -47,15 +56,25 @@ impl Decoder {
         schema_name: &str,
         schema_data: &[u8],
     ) -> Result<Self, DecodeError> {
+        // Comments may be in any encoding; names are checked to be ASCII.
+        let text = || String::from_utf8_lossy(schema_data);
+        let wrong = |expected| DecodeError::SchemaEncoding {
+            message: message_encoding.to_owned(),
+            found: schema_encoding.to_owned(),
+            expected,
+        };
         let format = match (message_encoding, schema_encoding) {
             ("json", _) => Format::Json,
-            ("cdr", "ros2msg") => {
-                // Comments may be in any encoding; names are checked to be ASCII.
-                let text = String::from_utf8_lossy(schema_data);
-                let root = definition::resolve(&ros2::parse(schema_name, &text)?)?;
-                Format::Cdr { root, pick: Pick::All }
+            ("cdr", "ros2msg") => Format::cdr(&msg::parse(schema_name, &text(), Dialect::Ros2)?)?,
+            ("cdr", "ros2idl" | "omgidl") => Format::cdr(&idl::parse(schema_name, &text())?)?,
+            ("cdr", _) => return Err(wrong("ros2msg, ros2idl or omgidl")),
+            ("ros1", "ros1msg") => {
+                let definition = msg::parse(schema_name, &text(), Dialect::Ros1)?;
+                Format::Ros1 { root: definition::resolve(&definition, 0)?, pick: Pick::All }
             }
-            ("cdr", _) => return Err(DecodeError::SchemaEncoding { found: schema_encoding.to_owned() }),
+            ("ros1", _) => return Err(wrong("ros1msg")),
+            ("protobuf", "protobuf") => Format::Protobuf(Message::new(schema_name, schema_data)?),
+            ("protobuf", _) => return Err(wrong("protobuf")),
             _ => return Err(DecodeError::MessageEncoding { found: message_encoding.to_owned() }),
         };
         Ok(Self { format })
@@ -75,6 +94,10 @@ impl Decoder {
             Format::Cdr { root, .. } => {
                 Format::Cdr { root: Arc::clone(root), pick: Pick::of_paths(root, wanted)? }
             }
+            Format::Ros1 { root, .. } => {
+                Format::Ros1 { root: Arc::clone(root), pick: Pick::of_paths(root, wanted)? }
+            }
+            Format::Protobuf(message) => Format::Protobuf(message.select(wanted)?),
         };
         Ok(Self { format })
     }
@@ -82,13 +105,22 @@ impl Decoder {
     /// Decodes one message.
     ///
     /// # Errors
-    /// [`DecodeError::Json`], [`DecodeError::Truncated`], [`DecodeError::Representation`] or
-    /// [`DecodeError::WideText`].
+    /// [`DecodeError::Json`], [`DecodeError::Truncated`], [`DecodeError::Representation`], [`DecodeError::WideText`],
+    /// [`DecodeError::Protobuf`] or [`DecodeError::TooManyValues`].
     pub fn decode(&self, payload: &[u8]) -> Result<Value, DecodeError> {
         match &self.format {
             Format::Json => json::decode(payload),
             Format::Cdr { root, pick } => cdr::decode(root, pick, payload),
+            Format::Ros1 { root, pick } => ros1::decode(root, pick, payload),
+            Format::Protobuf(message) => message.decode(payload),
         }
+    }
+}
+
+impl Format {
+    fn cdr(definition: &RawDefinition) -> Result<Self, DecodeError> {
+        // An empty struct is one byte there, `structure_needs_at_least_one_member`.
+        Ok(Self::Cdr { root: definition::resolve(definition, 1)?, pick: Pick::All })
     }
 }
 
@@ -96,16 +128,20 @@ impl Decoder {
 #[derive(Debug, thiserror::Error)]
 pub enum DecodeError {
     /// A message encoding that nothing here reads.
-    #[error("message encoding {found:?} is not supported, expected cdr or json")]
+    #[error("message encoding {found:?} is not supported, expected json, cdr, ros1 or protobuf")]
     MessageEncoding {
         /// The channel's message encoding.
         found: String,
     },
-    /// CDR messages whose schema is in a language that nothing here reads.
-    #[error("schema encoding {found:?} of cdr messages is not supported, expected ros2msg")]
+    /// Messages whose schema is in a language that nothing here reads, or that doesn't fit their encoding.
+    #[error("schema encoding {found:?} of {message} messages is not supported, expected {expected}")]
     SchemaEncoding {
+        /// The channel's message encoding.
+        message: String,
         /// The schema's encoding; empty where the channel has no schema.
         found: String,
+        /// What is read.
+        expected: &'static str,
     },
     /// A line of a message definition that is not as the language has it.
     #[error("definition line {line}: {found:?}, expected {expected}")]
@@ -166,13 +202,29 @@ pub enum DecodeError {
         /// How many bytes there are.
         left: usize,
     },
-    /// A `wstring`, whose bytes differ between middlewares that don't say which they are.
-    #[error("field {field:?} at byte {at} is a wstring, which has no agreed encoding")]
-    WideText {
-        /// The field's place in the message.
-        field: String,
-        /// Where in the payload.
-        at: usize,
+    /// Characters of a `wstring` have 2 bytes with some middlewares, 4 with others, and this message fits both or
+    /// neither.
+    #[error("the message has a wstring, and doesn't tell whether its characters have 2 bytes or 4")]
+    WideText,
+    /// A schema that has no type of the name that it goes by.
+    #[error("type {name} is not defined in the schema")]
+    MissingRoot {
+        /// That name.
+        name: String,
+    },
+    /// A Protobuf schema that is no set of file descriptors.
+    #[error("protobuf descriptor: {0}")]
+    Descriptor(String),
+    /// A payload that is no Protobuf, or not of the channel's type.
+    #[error("protobuf payload: {0}")]
+    Protobuf(String),
+    /// A payload of few bytes that would become very many values.
+    #[error("the message's {bytes} bytes stand for more than {most} values")]
+    TooManyValues {
+        /// Bytes of the payload.
+        bytes: usize,
+        /// The limit.
+        most: usize,
     },
 }
 
@@ -180,7 +232,7 @@ impl DecodeError {
     /// Puts `name` before the place of the field.
     #[cold]
     fn inside(mut self, name: &str) -> Self {
-        if let Self::Truncated { field, .. } | Self::WideText { field, .. } = &mut self {
+        if let Self::Truncated { field, .. } = &mut self {
             let place = if field.is_empty() { name.to_owned() } else { format!("{name}.{field}") };
             *field = place;
         }
@@ -199,16 +251,16 @@ mod tests {
     #[test]
     fn an_encoding_that_nothing_reads_is_an_error_that_names_what_is_read() {
         assert_eq!(
-            refusal("ros1", "ros1msg"),
-            "message encoding \"ros1\" is not supported, expected cdr or json"
-        );
-        assert_eq!(
-            refusal("cdr", "ros2idl"),
-            "schema encoding \"ros2idl\" of cdr messages is not supported, expected ros2msg"
+            refusal("flatbuffer", "flatbuffer"),
+            "message encoding \"flatbuffer\" is not supported, expected json, cdr, ros1 or protobuf"
         );
         assert_eq!(
             refusal("cdr", ""),
-            "schema encoding \"\" of cdr messages is not supported, expected ros2msg"
+            "schema encoding \"\" of cdr messages is not supported, expected ros2msg, ros2idl or omgidl"
+        );
+        assert_eq!(
+            refusal("ros1", "ros2msg"),
+            "schema encoding \"ros2msg\" of ros1 messages is not supported, expected ros1msg"
         );
     }
 

@@ -181,7 +181,7 @@ mod tests {
         let decoder = Decoder::new("cdr", "ros2msg", "p/msg/Beacons", BEACONS.as_bytes()).unwrap();
         match decoder.select(&paths).map_err(|miss| miss.to_string())?.format {
             super::super::Format::Cdr { pick, .. } => Ok(written(&pick)),
-            super::super::Format::Json => unreachable!("a cdr decoder"),
+            _ => unreachable!("a cdr decoder"),
         }
     }
 

@@ -1,14 +1,18 @@
-//! The `ros2msg` schema encoding: `.msg` texts joined by lines of `=`, each headed by `MSG: package/Type`.
+//! The `ros1msg` and `ros2msg` schema encodings: `.msg` texts joined by lines of `=`, each headed by
+//! `MSG: package/Type`.
 //!
-//! <https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html> has the syntax of one text,
-//! <https://mcap.dev/spec/registry#ros2msg> of the joined ones. Constants, defaults and bounds don't change
-//! the bytes of a message: they are read over.
+//! <https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html> and <http://wiki.ros.org/msg> have the
+//! syntax of one text, <https://mcap.dev/spec/registry#ros2msg> of the joined ones. Constants, defaults and bounds
+//! don't change the bytes of a message: they are read over.
+//!
+//! The messages of `/_service_event` topics come with the `.srv` text of their service: what they hold is made of
+//! it as `rosidl` does.
 
 use super::DecodeError;
 use super::definition::{RawDefinition, RawElement, RawField, RawStruct, Scalar, Shape};
 
 /// Types that many texts name without spelling them out; one in the text itself goes before.
-const WELL_KNOWN: &str = "\
+const WELL_KNOWN_OF_ROS_2: &str = "\
 ================================================================================
 MSG: builtin_interfaces/Time
 int32 sec
@@ -21,20 +25,56 @@ uint32 nanosec
 MSG: std_msgs/Header
 builtin_interfaces/Time stamp
 string frame_id
+================================================================================
+MSG: service_msgs/ServiceEventInfo
+uint8 event_type
+builtin_interfaces/Time stamp
+char[16] client_gid
+int64 sequence_number
 ";
+
+/// The same of ROS 1, where times are no types but parts of the language.
+const WELL_KNOWN_OF_ROS_1: &str = "\
+================================================================================
+MSG: ros/time
+uint32 sec
+uint32 nsec
+================================================================================
+MSG: ros/duration
+int32 sec
+int32 nsec
+================================================================================
+MSG: std_msgs/Header
+uint32 seq
+time stamp
+string frame_id
+";
+
+/// Which ROS a text is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Dialect {
+    Ros1,
+    Ros2,
+}
 
 /// The types of `text`; the first has no header and is the message itself, called `schema_name`.
 ///
 /// # Errors
 /// [`DecodeError::Definition`] names the line.
-pub(super) fn parse(schema_name: &str, text: &str) -> Result<RawDefinition, DecodeError> {
-    let mut definition = parse_text(schema_name, text)?;
-    definition.others.extend(parse_text("", WELL_KNOWN)?.others);
+pub(super) fn parse(schema_name: &str, text: &str, dialect: Dialect) -> Result<RawDefinition, DecodeError> {
+    let well_known = match dialect {
+        Dialect::Ros1 => WELL_KNOWN_OF_ROS_1,
+        Dialect::Ros2 => WELL_KNOWN_OF_ROS_2,
+    };
+    let mut definition = parse_text(schema_name, text, dialect)?;
+    definition.others.extend(parse_text("", well_known, dialect)?.others);
     Ok(definition)
 }
 
-fn parse_text(schema_name: &str, text: &str) -> Result<RawDefinition, DecodeError> {
+fn parse_text(schema_name: &str, text: &str, dialect: Dialect) -> Result<RawDefinition, DecodeError> {
     let mut root = RawStruct { name: package_and_type(schema_name), fields: Vec::new() };
+    let mut service =
+        schema_name.contains("/srv/").then(|| root.name.strip_suffix("_Event")).flatten().map(str::to_owned);
     let mut others: Vec<RawStruct> = Vec::new();
     let mut header_expected = false;
     for (index, line) in text.lines().enumerate() {
@@ -54,12 +94,33 @@ fn parse_text(schema_name: &str, text: &str) -> Result<RawDefinition, DecodeErro
             others.push(RawStruct { name: package_and_type(name.trim()), fields: Vec::new() });
             header_expected = false;
         } else if line == "---" {
-            return Err(error("a message; services and actions can't be decoded"));
-        } else if let Some(field) = parse_line(line).map_err(error)? {
+            // what stood before it is the request, what follows the response
+            let name =
+                service.take().ok_or_else(|| error("a message; services and actions can't be decoded"))?;
+            let event = event_of(&root.name, &name);
+            let request = std::mem::replace(&mut root, event);
+            others.insert(0, RawStruct { name: format!("{name}_Request"), ..request });
+            others.push(RawStruct { name: format!("{name}_Response"), fields: Vec::new() });
+        } else if let Some(field) = parse_line(line, dialect).map_err(error)? {
             others.last_mut().unwrap_or(&mut root).fields.push(field);
         }
     }
     Ok(RawDefinition { root, others })
+}
+
+/// The message of a service's events: who and when, and what was asked or answered where it is recorded.
+fn event_of(name: &str, service: &str) -> RawStruct {
+    let field = |name: &str, of: String, shape| RawField {
+        name: name.to_owned(),
+        element: RawElement::Named(of),
+        shape,
+    };
+    let fields = vec![
+        field("info", "service_msgs/ServiceEventInfo".to_owned(), Shape::One),
+        field("request", format!("{service}_Request"), Shape::Sequence),
+        field("response", format!("{service}_Response"), Shape::Sequence),
+    ];
+    RawStruct { name: name.to_owned(), fields }
 }
 
 /// `package/msg/Type` and `package/Type` are the same type.
@@ -72,7 +133,7 @@ fn package_and_type(name: &str) -> String {
 }
 
 /// `TYPE NAME`, `TYPE NAME DEFAULT`, or `None` for a constant: `TYPE NAME=VALUE`.
-fn parse_line(line: &str) -> Result<Option<RawField>, &'static str> {
+fn parse_line(line: &str, dialect: Dialect) -> Result<Option<RawField>, &'static str> {
     let (type_text, rest) = line.split_once(char::is_whitespace).ok_or("a type and a field name")?;
     let rest = rest.trim_start();
     let end = rest.find(|c: char| !c.is_ascii_alphanumeric() && c != '_').unwrap_or(rest.len());
@@ -80,7 +141,7 @@ fn parse_line(line: &str) -> Result<Option<RawField>, &'static str> {
     if !name.starts_with(|c: char| c.is_ascii_alphabetic()) {
         return Err("a field name that starts with a letter");
     }
-    let (element, shape) = parse_type(type_text)?;
+    let (element, shape) = parse_type(type_text, dialect)?;
     if behind.trim_start().starts_with('=') {
         return Ok(None);
     }
@@ -91,7 +152,7 @@ fn parse_line(line: &str) -> Result<Option<RawField>, &'static str> {
 }
 
 /// `string<=10[<=5]`: an element, then perhaps an array.
-fn parse_type(text: &str) -> Result<(RawElement, Shape), &'static str> {
+fn parse_type(text: &str, dialect: Dialect) -> Result<(RawElement, Shape), &'static str> {
     const BAD_SIZE: &str = "an array size such as [], [3] or [<=3], not zero";
     let (element, shape) = match text.split_once('[') {
         None => (text, Shape::One),
@@ -111,12 +172,14 @@ fn parse_type(text: &str) -> Result<(RawElement, Shape), &'static str> {
     if !bound.bytes().all(|byte| byte.is_ascii_digit()) {
         return Err("a bound such as string<=10");
     }
-    Ok((parse_element(name)?, shape))
+    Ok((parse_element(name, dialect)?, shape))
 }
 
-fn parse_element(name: &str) -> Result<RawElement, &'static str> {
+fn parse_element(name: &str, dialect: Dialect) -> Result<RawElement, &'static str> {
+    let is_ros_1 = dialect == Dialect::Ros1;
     let scalar = match name {
         "bool" => Scalar::Bool,
+        "byte" if is_ros_1 => Scalar::Int { size: 1 },
         "byte" | "char" | "uint8" => Scalar::Uint { size: 1 },
         "int8" => Scalar::Int { size: 1 },
         "int16" => Scalar::Int { size: 2 },
@@ -129,6 +192,7 @@ fn parse_element(name: &str) -> Result<RawElement, &'static str> {
         "float64" => Scalar::Float { size: 8 },
         "string" => return Ok(RawElement::Text),
         "wstring" => return Ok(RawElement::WideText),
+        "time" | "duration" if is_ros_1 => return Ok(RawElement::Named(format!("ros/{name}"))),
         "time" => return Ok(RawElement::Named("builtin_interfaces/Time".to_owned())),
         "duration" => return Ok(RawElement::Named("builtin_interfaces/Duration".to_owned())),
         _ => {
@@ -152,7 +216,7 @@ mod tests {
     use super::*;
 
     fn root(text: &str) -> Result<std::sync::Arc<Struct>, DecodeError> {
-        resolve(&parse("pkg/msg/Root", text)?)
+        resolve(&parse("pkg/msg/Root", text, Dialect::Ros2)?, 1)
     }
 
     fn error(text: &str) -> String {
@@ -211,6 +275,24 @@ mod tests {
         assert!(error("int32 a-b").contains("letters, digits"));
         assert!(error("===\nint32 a").contains("MSG: package/Type"));
         assert!(error("int64 a\n---\nint64 b").contains("services"));
+    }
+
+    #[test]
+    fn the_event_of_a_service_holds_who_and_when_the_request_and_the_response() {
+        let text = "int64 a\nP p\n---\nint64 sum\n===\nMSG: pkg/P\nbool x";
+        let event = resolve(&parse("pkg/srv/Add_Event", text, Dialect::Ros2).unwrap(), 1).unwrap();
+        assert_eq!(
+            event.fields.iter().map(|f| &*f.name).collect::<Vec<_>>(),
+            ["info", "request", "response"]
+        );
+        assert_eq!(event.least_size, 1 + 8 + 16 + 8 + 4 + 4);
+        let element = |i: usize| match &event.fields[i].element {
+            Element::Struct(inner) => inner.fields.iter().map(|f| f.name.to_string()).collect::<Vec<_>>(),
+            _ => Vec::new(),
+        };
+        assert_eq!((element(1), element(2)), (vec!["a".into(), "p".into()], vec!["sum".to_owned()]));
+        let twice = parse("pkg/srv/Add_Event", "---\n---", Dialect::Ros2).unwrap_err().to_string();
+        assert!(twice.contains("services"), "{twice}");
     }
 
     proptest! {

@@ -1,0 +1,124 @@
+//! Latitudes and longitudes become a track in metres, about an origin that the result names.
+
+use std::fs;
+
+use serde_json::{Value, json};
+use trackfuse::math::geodesy::{Geodetic, LocalFrame};
+
+use super::trial::{Trial, assert_says, logs, trackfuse};
+use super::trial_log::{Sensor, TrialLog, ns, position, stamp, velocity, xyz};
+
+const ORIGIN: [f64; 3] = [59.4, 10.5, 3.0];
+
+/// A fix at the place that lies at `enu` from the origin.
+fn fix(t: f64, enu: [f64; 3]) -> Value {
+    let place = LocalFrame::new(Geodetic::from_degrees(ORIGIN)).to_geodetic(enu).to_degrees();
+    json!({
+        "timestamp": stamp(ns(t)), "frame_id": "antenna", "latitude": place[0], "longitude": place[1],
+        "altitude": place[2], "position_covariance": [0.04, 0, 0, 0, 0.04, 0, 0, 0, 0.16], "position_covariance_type": 2
+    })
+}
+
+fn log_of_fixes(change: impl Fn(usize, &mut Value)) -> Vec<u8> {
+    let mut log = TrialLog::new();
+    let sensor = Sensor { sigma: 0.05, ..Sensor::new(0.0, 8.0, 1) };
+    for (i, (t, p, v)) in sensor.samples().into_iter().enumerate() {
+        let mut message = fix(t, p);
+        change(i, &mut message);
+        log.json("/gps/fix", t, &message);
+        log.json("/gps/vel", t, &json!({"timestamp": stamp(ns(t)), "velocity": xyz(v)}));
+    }
+    log.finish()
+}
+
+const CONFIG: &str = "[output]\norigin = [59.4, 10.5, 3.0]\n[[source]]\nname = \"gps\"\nposition = \"/gps/fix\"\n\
+                      velocity = \"/gps/vel.velocity\"\n";
+
+#[test]
+fn fixes_become_metres_about_the_origin_of_the_config() {
+    let (report, output) = Trial::of(log_of_fixes(|_, _| {})).config(CONFIG).report(0);
+    let (p, expected) = (output.near(4.0).vector("position"), position(4.0));
+    assert!((0..3).all(|i| (p[i] - expected[i]).abs() < 0.1), "{p:?}");
+    let v = output.near(4.0).vector("velocity");
+    assert!((0..3).all(|i| (v[i] - velocity(4.0)[i]).abs() < 0.1), "{v:?}");
+    assert_eq!(report["track"]["origin"], json!(ORIGIN));
+    assert_eq!(report["track"]["frame_id"], "enu");
+    let source = &report["sources"][0];
+    assert_eq!(source["position_sigma_from"], "messages");
+    assert!((source["position_sigma_m"].as_f64().unwrap() - 0.2).abs() < 1e-9);
+}
+
+#[test]
+fn fixes_count_from_the_first_by_default_and_the_origin_makes_the_track_again() {
+    let config = CONFIG.replace("[output]\norigin = [59.4, 10.5, 3.0]\n", "");
+    let trial = Trial::of(log_of_fixes(|_, _| {})).config(&config);
+    let (report, output) = trial.report(0);
+    let p = output.near(0.0).vector("position");
+    assert!(p.iter().all(|v| v.abs() < 0.3), "{p:?}");
+    let latitude = report["track"]["origin"][0].as_f64().unwrap();
+    assert!((latitude - 59.4).abs() < 1e-4 && latitude != 59.4);
+    let again =
+        Trial::of(log_of_fixes(|_, _| {})).config(&output.metadata["trackfuse:/fused"]["config"]).report(0).1;
+    assert!(again.track().iter().zip(output.track()).all(|(a, b)| a.value == b.value));
+    assert_says(
+        &trial.fuse(&["--force"]).stdout,
+        &["metres east, north and up of latitude 59.39999", "(WGS 84)"],
+    );
+    // what the track is held to counts from the same origin
+    let ran = trackfuse(trial.folder(), &["compare", "in.fused.mcap", "--reference", "/gps/fix", "--json"]);
+    let report: Value = serde_json::from_str(&ran.stdout).unwrap();
+    let rmse = report["all"]["position"]["rmse"].as_f64();
+    assert!(rmse.is_none_or(|rmse| rmse < 0.2), "{}", ran.stdout);
+}
+
+#[test]
+fn fixes_without_a_fix_or_off_the_earth_are_no_samples_and_an_unknown_covariance_is_none() {
+    let log = log_of_fixes(|i, message| match i {
+        10..20 => message["status"] = json!({"status": -1, "service": 1}),
+        20 => message["latitude"] = json!(91.0),
+        21 => message["altitude"] = Value::Null,
+        _ => message["position_covariance_type"] = json!(0),
+    });
+    let (report, _) = Trial::of(log).config(CONFIG).report(3);
+    let source = &report["sources"][0];
+    assert_eq!(source["positions"], 149);
+    let warnings = report["warnings"].to_string();
+    assert_says(
+        &warnings,
+        &[
+            "10 samples are left out: their status is that there is no fix",
+            "a latitude beyond 90 degrees",
+            "NaN",
+        ],
+    );
+}
+
+#[test]
+fn fixes_and_odometry_of_a_real_robot_are_chosen_on_the_command_line_and_never_fused_in_silence() {
+    let Some(path) = logs("others").into_iter().find(|p| p.ends_with("husky_gps_odom_ros1.mcap")) else {
+        return;
+    };
+    let trial = Trial::of(fs::read(path).unwrap());
+    assert_says(
+        &trial.error(2),
+        &["/fix (position)", "/husky_velocity_controller/odom (position and velocity)", "--source TOPIC"],
+    );
+    let odom = "/husky_velocity_controller/odom";
+    let made = trackfuse(
+        trial.folder(),
+        &["init", "in.mcap", "--source", "/fix", "--source", odom, "-o", "trial.toml"],
+    );
+    assert_eq!(made.code, 0, "{made:#?}");
+    assert_says(&made.stdout, &["in.mcap -> trial.toml: fix (datum), husky_velocity_controller"]);
+    // the odometry's heading is off by 128 degrees
+    assert_ne!(trial.fuse(&[]).code, 0);
+    let config = fs::read_to_string(trial.path("trial.toml")).unwrap();
+    let trial = trial.config(&config.replace("#estimate = \"auto\"", "estimate = []"));
+    let (report, _) = trial.report(3);
+    assert_eq!(report["sources"][0]["positions"], 989);
+    assert_eq!(report["sources"][1]["positions"], 3952);
+    assert!((report["track"]["origin"][0].as_f64().unwrap() - 42.375812).abs() < 1e-4);
+    let unknown = trackfuse(trial.folder(), &["init", "in.mcap", "--source", "/fax"]);
+    assert_eq!(unknown.code, 2, "{unknown:#?}");
+    assert_says(&unknown.stderr, &["\"/fax\" is not in the log", "did you mean \"/fix\"?"]);
+}
