@@ -103,7 +103,7 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     };
     let metadata = metadata(&log, &config, &report)?;
     let mut appender = Appender::begin(&log, &destination, &channels, config.output.compression)?;
-    appender.leave_out(&log, read.bad_chunks());
+    appender.leave_out(read.bad_chunks());
     bar.doing("writing the track");
     for message in messages(&fusion, context, &text, &warnings) {
         appender.write(crate::log::NewMessage {

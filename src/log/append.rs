@@ -19,7 +19,7 @@ use super::index::SummaryRecord;
 use super::output::{Destination, Sink};
 use super::rescue::{left_of_cut_chunk, lost_message_indexes};
 use super::summary::{self, encode, encode_body, encode_bytes};
-use super::{Index, Log, LogError, Visibility, chunk, old_tail, times};
+use super::{Index, Log, LogError, Visibility, chunk, old_tail};
 
 /// A viewer's seek then loads at most this much more than before.
 const CHUNK_BYTES: usize = 4_000_000;
@@ -138,26 +138,10 @@ impl<'a> Appender<'a> {
         Ok(())
     }
 
-    /// Leaves chunks of the log out of the chunk index and the counts, by their starts: those that were found to be
-    /// undecodable when they were read. Their bytes stay.
-    pub fn leave_out(&mut self, log: &Log, chunk_starts: impl IntoIterator<Item = u64>) {
-        let mut buf = Vec::new();
-        for start in chunk_starts {
-            let Some(chunk) = self.old.chunks.iter().find(|chunk| chunk.chunk_start_offset == start) else {
-                continue;
-            };
-            if !self.left_out.insert(start) {
-                continue;
-            }
-            let statistics = &mut self.statistics;
-            times::message_index(&log.file, chunk, &mut buf, &mut |id, times| {
-                let lost = times.len() as u64;
-                statistics.message_count = statistics.message_count.saturating_sub(lost);
-                if let Some(count) = statistics.channel_message_counts.get_mut(&id) {
-                    *count = count.saturating_sub(lost);
-                }
-            });
-        }
+    /// Leaves chunks of the log out of the chunk index, by their starts: those that were found to be undecodable
+    /// when they were read. Their bytes stay, and so do the counts.
+    pub fn leave_out(&mut self, chunk_starts: impl IntoIterator<Item = u64>) {
+        self.left_out.extend(chunk_starts);
     }
 
     /// Adds a metadata record.
