@@ -1,4 +1,4 @@
-//! Registration against the truth of simulated climbs; `examples/registration_study` has the whole table.
+//! Registration against the truth of simulated climbs; `examples/study` has the whole table.
 
 use trackfuse::estimate::registration::{Registered, Settings, register};
 use trackfuse::sample::{Sample, Source};

@@ -80,7 +80,8 @@ const LIKELY: f64 = 0.5;
 /// Noise this many times what was stated means that something is wrong with one or the other.
 const MISFIT: f64 = 3.0;
 
-/// Warns of what the registration can't tell, and of what it leaves.
+/// Warns of what the registration can't tell, and of what it leaves in `sources`, which are corrected and without
+/// what was rejected.
 pub(super) fn warn(
     sources: &[Source],
     registered: &Registered,
@@ -130,7 +131,8 @@ pub(super) fn warn(
         }
         for quantity in Quantity::ALL {
             let of = |r: &&crate::estimate::registration::Rejected| (r.source, r.quantity) == (s, quantity);
-            let (count, all) = (registered.rejected.iter().filter(of).count(), source.series(quantity).len());
+            let count = registered.rejected.iter().filter(of).count();
+            let all = count + source.series(quantity).len();
             if 10 * count > all {
                 warnings.push(format!(
                     "{count} of {all} samples of {}'s {} are rejected as outliers",
@@ -168,5 +170,33 @@ pub(super) fn warn(
             d.quantity.name(),
             d.quantity.unit()
         ));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::warn;
+    use crate::estimate::registration::{Settings, register};
+    use crate::sample::{Sample, Source};
+
+    /// 200 samples at 5 m/s, every fourth 30 m off if `wild`.
+    fn source(name: &str, wild: bool) -> Source {
+        let sample = |i: u32| {
+            let off = if wild && i.is_multiple_of(4) { 30.0 } else { 0.0 };
+            let noise = 0.1 * (7.3 * f64::from(i * i)).sin();
+            let time_s = 0.05 * f64::from(i);
+            Sample { time_s, value: [noise, -noise, 5.0 * time_s + noise + off], sigma: [0.1; 3] }
+        };
+        Source { name: name.into(), positions: (0..200).map(sample).collect(), ..Source::default() }
+    }
+
+    #[test]
+    fn rejected_samples_are_counted_among_all_samples() {
+        let sources = [source("tether", false), source("beacon", true)];
+        let found = register(&sources, 0, &[(0.0, 10.0)], &Settings::default()).expect("a good problem");
+        let mut warnings = Vec::new();
+        warn(&found.corrected(&sources), &found, &[], &mut warnings);
+        let wanted = "50 of 200 samples of beacon's position are rejected as outliers";
+        assert!(warnings.iter().any(|w| w == wanted), "{warnings:?}");
     }
 }

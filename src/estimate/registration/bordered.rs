@@ -144,7 +144,8 @@ pub(super) fn eliminate(
     let mut solved = std::array::from_fn(|_| Vec::new());
     for axis in 0..3 {
         let cholesky = factor(normal.gram(axis), &penalty.matrix, lambda[axis])?;
-        deviance += cholesky.log_determinant() - penalty.rank as f64 * lambda[axis].ln();
+        let of_penalty = penalty.rank as f64 * lambda[axis].ln() + penalty.log_weights;
+        deviance += cholesky.log_determinant() - of_penalty;
         let columns = normal.border[axis].iter().map(|border| {
             let mut columns = border.clone();
             cholesky.solve(&mut columns);

@@ -1,5 +1,6 @@
 //! One joint fit: spline and unknowns, noise levels and smoothing, by turns until nothing moves.
 
+use super::adaptive::jerk_weights;
 use super::bordered::{Layout, Posterior, eliminate};
 use super::knots::{Knots, Penalty};
 use super::model::Reference;
@@ -56,6 +57,8 @@ pub(super) struct Fit<'a> {
     pub(super) settings: &'a Settings,
     pub(super) knots: Knots,
     pub(super) penalty: Penalty,
+    /// The penalty's weights in time, by function.
+    pub(super) jerk_weights: Vec<f64>,
     pub(super) references: Vec<Reference>,
     /// Whether the source's rotation is looked for.
     pub(super) rotated: Vec<bool>,
@@ -335,6 +338,11 @@ impl<'a> Fit<'a> {
                     }
                 }
             }
+        }
+        // before, clocks that are far off look like jerk
+        if self.stage != Stage::First {
+            self.jerk_weights = jerk_weights(&self.knots, &posterior, self.lambda, &self.jerk_weights);
+            self.penalty = self.knots.jerk_penalty(&self.jerk_weights);
         }
         self.posterior = Some(posterior);
     }

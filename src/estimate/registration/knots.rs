@@ -1,10 +1,15 @@
 //! The knots of a track in one or several pieces, as one set of functions.
 
+use std::ops::Range;
+
 use crate::math::banded::Banded;
 use crate::math::gaussian_basis::{Active, GaussianBasis};
 
 /// Order of the difference penalty: the third, jerk.
 const PENALTY_ORDER: usize = 3;
+
+/// That difference.
+pub(super) const JERK: [f64; PENALTY_ORDER + 1] = [-1.0, 3.0, -3.0, 1.0];
 
 /// Knots beyond both ends of a piece: the edge error falls below 1e-6 of the signal.
 const MARGIN: usize = 4;
@@ -60,17 +65,24 @@ impl Knots {
         }
     }
 
-    /// The jerk penalty D3'D3, piece by piece.
-    pub(super) fn jerk_penalty(&self) -> Penalty {
-        let (mut matrix, mut rank) = (Banded::zeros(self.count, PENALTY_ORDER), 0);
-        for piece in &self.pieces {
+    /// The third differences by their first functions, piece by piece, and the piece's knot spacing, s.
+    pub(super) fn differences(&self) -> impl Iterator<Item = (Range<usize>, f64)> {
+        self.pieces.iter().map(|piece| {
             let rows = piece.basis.count().saturating_sub(PENALTY_ORDER);
-            for row in 0..rows {
-                matrix.add_outer(piece.offset + row, &[-1.0, 3.0, -3.0, 1.0], 1.0);
-            }
-            rank += rows;
+            (piece.offset..piece.offset + rows, piece.basis.spacing_s())
+        })
+    }
+
+    /// The jerk penalty D3' W D3, piece by piece, W by the differences' first functions.
+    pub(super) fn jerk_penalty(&self, weights: &[f64]) -> Penalty {
+        let matrix = Banded::zeros(self.count, PENALTY_ORDER);
+        let mut penalty = Penalty { matrix, rank: 0, log_weights: 0.0 };
+        for row in self.differences().flat_map(|(rows, _)| rows) {
+            penalty.matrix.add_outer(row, &JERK, weights[row]);
+            penalty.rank += 1;
+            penalty.log_weights += weights[row].ln();
         }
-        Penalty { matrix, rank }
+        penalty
     }
 }
 
@@ -79,4 +91,6 @@ impl Knots {
 pub(super) struct Penalty {
     pub(super) matrix: Banded,
     pub(super) rank: usize,
+    /// The logarithm of its determinant, but for a constant: the sum of the weights'.
+    pub(super) log_weights: f64,
 }

@@ -28,6 +28,7 @@
 //! | `model` | the equations above, linear about the last estimate (Gauss-Newton) |
 //! | `normal`, `bordered` | an arrowhead system, its banded blocks eliminated by the Schur complement; the curve's posterior covariance holds the border's share |
 //! | `smoothing` | the jerk's weight by restricted maximum likelihood (Wood 2011) |
+//! | `adaptive` | the same in time: smaller where the motion is sharp (Wood, Fasiolo 2017) |
 //! | `noise`, `residuals` | noise levels as variance components, outliers by a mixture of scales, correlated noise widens |
 //! | `selection` | which errors there are, by evidence, averaged (MacKay 1992; Madigan, Raftery 1994) |
 //! | `separation` | which unknowns the data can tell apart |
@@ -36,6 +37,7 @@
 //! Only differences are seen: an error that all sources share, or one of the datum, stays in the track and in no
 //! band.
 
+mod adaptive;
 mod bordered;
 mod clock;
 mod correction;
@@ -132,7 +134,7 @@ pub struct Registered {
     pub rejected: Vec<Rejected>,
     /// Number of knots.
     pub knots: usize,
-    /// Weight of the jerk penalty by axis, 1/m^2.
+    /// Weight of the jerk penalty by axis, 1/m^2; about it, the weight varies in time.
     pub lambda: [f64; 3],
     /// The logarithm of the evidence, to compare registrations of the same samples.
     pub log_evidence: f64,

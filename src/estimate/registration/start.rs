@@ -36,6 +36,7 @@ impl<'a> Fit<'a> {
     ) -> Self {
         let spacing_s = settings.knot_spacing_s.unwrap_or_else(|| spacing_s(sources, pieces));
         let knots = Knots::covering(pieces, spacing_s, pad_s);
+        let jerk_weights = vec![1.0; knots.count()];
         let centre = middle(sources);
         let reference = |i: usize| Reference {
             anchor: Anchor { time_s: common_s(&sources[i], &sources[datum]), point_m: centre },
@@ -51,7 +52,8 @@ impl<'a> Fit<'a> {
         Self {
             sources,
             settings,
-            penalty: knots.jerk_penalty(),
+            penalty: knots.jerk_penalty(&jerk_weights),
+            jerk_weights,
             knots,
             references: (0..sources.len()).map(reference).collect(),
             rotated: guesses.iter().map(|g| g.rotation_rad.is_some()).collect(),
