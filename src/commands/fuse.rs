@@ -14,7 +14,7 @@ use crate::publish::{Context, Topic, messages};
 use crate::report::{self, Report};
 use crate::resolve;
 use crate::sample::Source;
-use crate::source::{self, Candidate, Samples};
+use crate::source::{self, Recognised, Samples};
 use crate::time::Time;
 use crate::track::TrackPoint;
 
@@ -46,7 +46,7 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     Appender::check(&log, &destination, &channels)?;
 
     let named = !config.source.is_empty();
-    let (unused, of_sources) = choose_sources(&log, &mut config)?;
+    let Recognised { unused, warnings: of_sources, bad_chunks, .. } = choose_sources(&log, &mut config)?;
     warnings.extend(of_sources);
     let Samples { mut loaded, origin, left_out, mut read } =
         source::load(&log, &config.source, named, config.output.origin)?;
@@ -103,7 +103,7 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     };
     let metadata = metadata(&log, &config, &report)?;
     let mut appender = Appender::begin(&log, &destination, &channels, config.output.compression)?;
-    appender.leave_out(read.bad_chunks());
+    appender.leave_out(bad_chunks.into_iter().chain(read.bad_chunks()));
     bar.doing("writing the track");
     for message in messages(&fusion, context, &text, &warnings) {
         appender.write(crate::log::NewMessage {
@@ -149,15 +149,14 @@ fn destination(args: &Fuse) -> Destination {
     }
 }
 
-/// Fills in the sources where the config names none, and returns the channels that were passed over, with
-/// what is to be said of them.
-fn choose_sources(log: &Log, config: &mut Config) -> Result<(Vec<Candidate>, Vec<String>), CommandError> {
+/// Fills in the sources where the config names none, and returns what else was found on the way.
+fn choose_sources(log: &Log, config: &mut Config) -> Result<Recognised, CommandError> {
     if !config.source.is_empty() {
-        return Ok((Vec::new(), Vec::new()));
+        return Ok(Recognised::default());
     }
-    let recognised = source::recognise(log, &config.output.prefix)?;
-    config.source = recognised.sources;
-    Ok((recognised.unused, recognised.warnings))
+    let mut recognised = source::recognise(log, &config.output.prefix)?;
+    config.source = std::mem::take(&mut recognised.sources);
+    Ok(recognised)
 }
 
 /// An error where the track has a point that is no number, which happens with samples of absurd size.

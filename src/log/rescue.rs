@@ -22,6 +22,10 @@ pub(super) fn lost_message_indexes(
     index: &Index,
 ) -> Result<Option<(ChunkIndex, Vec<MessageIndex>)>, LogError> {
     let Some(TornChunk { whole }) = &index.torn_chunk else { return Ok(None) };
+    // One that can't be decoded was taken out of the index.
+    if !index.chunks.iter().any(|chunk| chunk.chunk_start_offset == whole.chunk_start_offset) {
+        return Ok(None);
+    }
     let mut buf = Vec::new();
     chunk::read_block(file, &Block::Chunk(whole), &mut Scratch::default(), &mut buf)?;
     let mut lost: BTreeMap<u16, Vec<MessageIndexEntry>> = BTreeMap::new();

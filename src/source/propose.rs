@@ -78,7 +78,7 @@ pub fn propose_chosen(log: &Log, topics: &[String]) -> Result<Proposal, SourceEr
     if let Some(first) = sources.first_mut() {
         first.datum = true;
     }
-    checked(log, &Recognised { sources, unused: Vec::new(), warnings: Vec::new(), bad_chunks: std::collections::BTreeSet::new() })
+    checked(log, &Recognised { sources, ..Recognised::default() })
 }
 
 /// The sources with what stands against them.

@@ -11,7 +11,7 @@ use crate::log::{Log, bad_chunks, passed_over};
 use crate::printable::printable;
 
 /// What a log's topics say.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recognised {
     /// The sources, as a config would name them; the datum first.
     pub sources: Vec<SourceConfig>,
