@@ -77,6 +77,7 @@ fn bytes(text: &str) -> Result<u64, String> {
 }
 
 /// Arguments of `fuse`.
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag")]
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
   trackfuse fuse dive.mcap                       writes dive.fused.mcap

@@ -113,6 +113,7 @@ impl LocalFrame {
 }
 
 #[cfg(test)]
+#[expect(clippy::unreadable_literal, reason = "as the other program printed them")]
 mod tests {
     use proptest::prelude::*;
 

@@ -25,9 +25,10 @@ pub use text::render;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::estimate::characteristic_point::CharacteristicPoint;
 use crate::estimate::coverage;
 use crate::estimate::extrapolation::LawKind;
-use crate::fusion::{Fusion, Plan, TriedLaw};
+use crate::fusion::{Fusion, Plan, SplineSummary, TriedLaw};
 use crate::sample::{Quantity, Source};
 use crate::source::{Candidate, Loaded};
 use crate::time::Time;
@@ -353,12 +354,7 @@ impl Report {
                     significant: d.is_significant(),
                 })
                 .collect(),
-            spline: fusion.spline.map(|s| SplineReport {
-                knots: s.knots.0,
-                knot_spacing_s: s.knots.1,
-                lambda: s.lambda,
-                noise_scale: s.noise_scale,
-            }),
+            spline: fusion.spline.map(SplineReport::new),
             extrapolation: plan.extrapolation.as_ref().filter(|_| !fusion.laws.is_empty()).map(|settings| {
                 ExtrapolationReport {
                     horizon_s: settings.horizon_s,
@@ -366,23 +362,36 @@ impl Report {
                     laws: fusion.laws.iter().map(LawReport::new).collect(),
                 }
             }),
-            characteristic_points: fusion
-                .events
-                .iter()
-                .map(|e| EventReport {
-                    name: e.name.clone(),
-                    time_ns: e.time.ns().to_string(),
-                    time_s: e.time.seconds_since(t0),
-                    time_sigma_s: e.time_sigma_s,
-                    position_m: e.state.position,
-                    velocity_m_s: e.state.velocity,
-                    velocity_sigma_m_s: Some(e.state.velocity_sigma)
-                        .filter(|v| v.iter().all(|s| s.is_finite())),
-                    phase: e.phase.name().into(),
-                })
-                .collect(),
+            characteristic_points: fusion.events.iter().map(|e| EventReport::new(e, t0)).collect(),
             notes: notes.to_vec(),
             warnings: warnings.to_vec(),
+        }
+    }
+}
+
+impl SplineReport {
+    fn new(spline: SplineSummary) -> Self {
+        Self {
+            knots: spline.knots.0,
+            knot_spacing_s: spline.knots.1,
+            lambda: spline.lambda,
+            noise_scale: spline.noise_scale,
+        }
+    }
+}
+
+impl EventReport {
+    fn new(event: &CharacteristicPoint, t0: Time) -> Self {
+        let sigma = event.state.velocity_sigma;
+        Self {
+            name: event.name.clone(),
+            time_ns: event.time.ns().to_string(),
+            time_s: event.time.seconds_since(t0),
+            time_sigma_s: event.time_sigma_s,
+            position_m: event.state.position,
+            velocity_m_s: event.state.velocity,
+            velocity_sigma_m_s: Some(sigma).filter(|v| v.iter().all(|s| s.is_finite())),
+            phase: event.phase.name().into(),
         }
     }
 }

@@ -130,13 +130,16 @@ fn track(encoding: &str, schema: (&str, &str, &[u8]), encode: Encode) -> Vec<Val
     output.track().iter().map(|written| written.value.clone()).collect()
 }
 
+/// Name, encoding, text.
+type Schema<'a> = (&'a str, &'a str, &'a [u8]);
+
 #[test]
 fn encodings_of_the_same_samples_give_the_same_track_to_the_last_bit() {
     let expected = track("json", ("", "", b""), json);
     assert!(expected.len() > 250);
     let msg = format!("std_msgs/Header header\n{VECTORS}");
     let protobuf_schema = descriptors();
-    let others: [(&str, (&str, &str, &[u8]), Encode); 4] = [
+    let others: [(&str, Schema<'_>, Encode); 4] = [
         ("cdr", ("nav/msg/Track", "ros2msg", msg.as_bytes()), cdr),
         ("cdr", ("nav/msg/Track", "ros2idl", IDL.as_bytes()), cdr),
         ("ros1", ("nav/Track", "ros1msg", msg.as_bytes()), ros_1),
@@ -144,7 +147,7 @@ fn encodings_of_the_same_samples_give_the_same_track_to_the_last_bit() {
     ];
     for (encoding, schema, encode) in others {
         let found = track(encoding, schema, encode);
-        let differs = expected.iter().zip(&found).position(|(a, b)| a.to_string() != b.to_string());
+        let differs = expected.iter().zip(&found).position(|(a, b)| format!("{a}") != format!("{b}"));
         assert_eq!((found.len(), differs), (expected.len(), None), "{encoding} {}", schema.1);
     }
 }

@@ -117,7 +117,7 @@ fn fixes_and_odometry_of_a_real_robot_are_chosen_on_the_command_line_and_never_f
     let (report, _) = trial.report(3);
     assert_eq!(report["sources"][0]["positions"], 989);
     assert_eq!(report["sources"][1]["positions"], 3952);
-    assert!((report["track"]["origin"][0].as_f64().unwrap() - 42.375812).abs() < 1e-4);
+    assert!((report["track"]["origin"][0].as_f64().unwrap() - 42.375_812).abs() < 1e-4);
     let unknown = trackfuse(trial.folder(), &["init", "in.mcap", "--source", "/fax"]);
     assert_eq!(unknown.code, 2, "{unknown:#?}");
     assert_says(&unknown.stderr, &["\"/fax\" is not in the log", "did you mean \"/fix\"?"]);

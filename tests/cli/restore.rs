@@ -318,7 +318,7 @@ fn force_replaces_a_link_and_keeps_what_it_leads_to() {
 #[test]
 fn in_place_is_refused_on_a_log_that_is_not_whole() {
     let whole = two_sensors();
-    let trial = Trial::of(whole[..whole.len() - 3].to_vec());
+    let trial = Trial::of(&whole[..whole.len() - 3]);
     let ran = trial.fuse_with(&["in.mcap", "--in-place"]);
     assert_eq!(ran.code, 1);
     assert_says(&ran.stderr, &["in place: it is damaged at offset", "`-o` writes a new log"]);

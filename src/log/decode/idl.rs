@@ -9,6 +9,9 @@ use super::DecodeError;
 use super::definition::{RawDefinition, RawElement, RawField, RawStruct, Scalar, Shape};
 use super::idl_text::{Word, words};
 
+/// A name and its type.
+type Declared<'t> = (&'t str, (RawElement, Shape));
+
 /// The types of `text`, with the one called `schema_name` as the message; scopes may stand there with `/` or `::`.
 ///
 /// # Errors
@@ -86,7 +89,7 @@ impl<'t> Parser<'t> {
     }
 
     /// `TYPE a, b[3];`
-    fn declaration(&mut self, scopes: &[&str]) -> Result<Vec<(&'t str, (RawElement, Shape))>, DecodeError> {
+    fn declaration(&mut self, scopes: &[&str]) -> Result<Vec<Declared<'t>>, DecodeError> {
         let (element, shape) = self.kind(scopes)?;
         let mut declared = Vec::new();
         loop {
