@@ -254,10 +254,12 @@ impl Survey<'_> {
         let Some(cut) = &mut self.index.cut_chunk else { return };
         match looked {
             Ok(contents) => {
-                let messages = contents.counted.message_count;
-                let what = format!(
-                    "{messages} messages of the chunk that is cut off are saved, which no checksum covers"
-                );
+                let what = match contents.counted.message_count {
+                    0 => "no message of the chunk that is cut off can be saved".to_owned(),
+                    messages => format!(
+                        "{messages} messages of the chunk that is cut off are saved, which no checksum covers"
+                    ),
+                };
                 self.damages.push(cut.offset, what);
                 cut.saved_bytes = self.buf.len() as u64;
             }
