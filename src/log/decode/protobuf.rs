@@ -46,7 +46,16 @@ impl Message {
                 )));
             }
         }
-        let pool = DescriptorPool::decode(descriptors).map_err(|e| DecodeError::Descriptor(e.to_string()))?;
+        let pool = unpanicked(|| DescriptorPool::decode(descriptors))
+            .ok_or_else(|| DecodeError::Descriptor(ODD.to_owned()))?
+            .map_err(|e| DecodeError::Descriptor(e.to_string()))?;
+        // a map without keys or values makes decoding panic
+        for entry in pool.all_messages().filter(MessageDescriptor::is_map_entry) {
+            if entry.get_field(1).is_none() || entry.get_field(2).is_none() {
+                let name = entry.full_name();
+                return Err(DecodeError::Descriptor(format!("the map {name:?} has no key or no value")));
+            }
+        }
         let descriptor = pool.get_message_by_name(schema_name);
         let missing = || DecodeError::MissingRoot { name: schema_name.to_owned() };
         Ok(Self { descriptor: descriptor.ok_or_else(missing)?, wanted: None })
@@ -100,12 +109,21 @@ impl Message {
 
     /// Decodes one message.
     pub(super) fn decode(&self, payload: &[u8]) -> Result<Value, DecodeError> {
-        let message = DynamicMessage::decode(self.descriptor.clone(), payload)
+        let message = unpanicked(|| DynamicMessage::decode(self.descriptor.clone(), payload))
+            .ok_or_else(|| DecodeError::Descriptor(ODD.to_owned()))?
             .map_err(|error| DecodeError::Protobuf(error.to_string()))?;
         let most = MOST_VALUES.saturating_add(payload.len().saturating_mul(MOST_VALUES_PER_BYTE));
         let too_many = DecodeError::TooManyValues { bytes: payload.len(), most };
         Budget { left: most }.object(&message, self.wanted.as_deref()).ok_or(too_many)
     }
+}
+
+/// What is said of descriptors that `prost_reflect` takes and then panics on.
+const ODD: &str = "they are such as no compiler writes";
+
+/// What `f` returns, `None` where it panics: `prost_reflect` does on some descriptors that no compiler writes.
+fn unpanicked<T>(f: impl FnOnce() -> T) -> Option<T> {
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(f)).ok()
 }
 
 /// A place in the type of a message.
