@@ -24,7 +24,9 @@ pub(super) fn encode_bytes(opcode: u8, body: &[&[u8]]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(len + HEAD_LEN as usize);
     bytes.push(opcode);
     bytes.extend((len as u64).to_le_bytes());
-    bytes.extend(body.iter().copied().flatten());
+    for part in body {
+        bytes.extend_from_slice(part);
+    }
     bytes
 }
 
