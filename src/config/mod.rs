@@ -4,6 +4,8 @@
 //! metadata, so that a track can be made again.
 
 mod check;
+#[cfg(test)]
+mod guide;
 mod template;
 
 pub use template::{SourceTable, template};

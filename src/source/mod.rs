@@ -5,6 +5,7 @@
 //! is one way in.
 
 mod candidate;
+mod events;
 mod fix;
 mod gathered;
 mod glimpse;
@@ -16,6 +17,7 @@ mod recorded;
 mod topic;
 
 pub use candidate::{Candidate, Judged, Judgement, Unfit, judge};
+pub use events::{RecordedEvent, recorded_events};
 pub use glimpse::{Glimpse, glimpse};
 pub use load::{Loaded, Samples, SigmaOrigin, Timing, datum, load};
 pub use propose::{Proposal, propose, propose_chosen};
