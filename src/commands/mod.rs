@@ -28,7 +28,7 @@ use std::process::ExitCode;
 use anstyle::{AnsiColor, Style};
 
 use crate::cli::{Memory, Voice};
-use crate::config::ConfigError;
+use crate::config::{ConfigError, why_unread};
 use crate::estimate::EstimateError;
 use crate::log::{Log, LogError, ReadOptions};
 use crate::printable::printable;
@@ -101,8 +101,8 @@ pub enum CommandError {
     /// What was found can't be printed.
     #[error("the result can't be printed: {0}")]
     Print(io::Error),
-    /// A file that is no log.
-    #[error("{path}: {source}")]
+    /// A scenario that can't be read.
+    #[error("scenario {path}: {}", why_unread(source))]
     File {
         /// The file.
         path: String,
@@ -121,6 +121,9 @@ impl CommandError {
             Self::Source(error) => error.hint(),
             Self::Resolve(error) => Some(error.hint()),
             Self::Export(error) => Some(error.hint().into()),
+            Self::File { .. } => {
+                Some("a scenario is a TOML file, such as `sample_logs/steep_climb.scenario.toml`".into())
+            }
             Self::NothingInCommon { .. } => {
                 Some("`--reference-time log` takes the reference's log times instead of its stamps".into())
             }
