@@ -86,7 +86,11 @@ fn row(schema: &Value, key: &str, property: &Value) -> String {
     };
     let example = property.get("examples").and_then(|list| list.get(0)).or(own).expect("each key has one");
     let cells = [takes(schema, property), unit(key), default, meaning].map(|cell| cell.replace('|', "\\|"));
-    format!("| `{key}` | {} | {} |\n", cells.join(" | "), format_args!("`{key} = {}`", example.to_string().replace(',', ", ")))
+    format!(
+        "| `{key}` | {} | {} |\n",
+        cells.join(" | "),
+        format_args!("`{key} = {}`", example.to_string().replace(',', ", "))
+    )
 }
 
 /// What kind of value a key takes.
@@ -124,7 +128,8 @@ fn the_guide_in_the_tree_is_the_one_of_this_code() {
 
 #[test]
 fn every_example_of_the_guide_is_taken_by_the_program() {
-    let parse = |text: &str| Config::parse(text, Path::new("guide.toml")).map_err(|e| format!("{e} in\n{text}"));
+    let parse =
+        |text: &str| Config::parse(text, Path::new("guide.toml")).map_err(|e| format!("{e} in\n{text}"));
     parse(EXAMPLE).expect("the example at its head");
     let page = guide();
     let mut seen = 0;
