@@ -25,7 +25,7 @@ fn git(args: &[&str]) -> Option<String> {
 
 /// The commit of the work tree that begins here; a package in another project's tree is not of its commits.
 fn of_the_tree() -> Option<String> {
-    if git(&["rev-parse", "--show-prefix"])? != "" {
+    if !git(&["rev-parse", "--show-prefix"])?.is_empty() {
         return None;
     }
     // where HEAD, and the branch that it names, are kept

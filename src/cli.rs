@@ -271,7 +271,11 @@ pub struct Export {
 }
 
 fn origin(text: &str) -> Result<[f64; 3], String> {
-    let expected = || format!("expected latitude and longitude in degrees and altitude in metres, such as 59.4,10.5,0, got {text:?}");
+    let expected = || {
+        format!(
+            "expected latitude and longitude in degrees and altitude in metres, such as 59.4,10.5,0, got {text:?}"
+        )
+    };
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|number| number.trim().parse()).collect();
     let place: [f64; 3] = numbers.ok().and_then(|n| n.try_into().ok()).ok_or_else(expected)?;
     let on_earth = place[0].abs() <= 90.0 && place[1].abs() <= 360.0 && place[2].abs() <= 1e5;

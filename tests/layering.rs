@@ -17,7 +17,10 @@ const WALLS: [(&str, &[&str]); 13] = [
         "src/estimate",
         &["crate::log", "crate::commands", "crate::config", "mcap", "clap", "std::fs", "println!"],
     ),
-    ("src/export", &["crate::log", "crate::commands", "crate::config", "mcap", "clap", "std::fs", "println!"]),
+    (
+        "src/export",
+        &["crate::log", "crate::commands", "crate::config", "mcap", "clap", "std::fs", "println!"],
+    ),
     ("src/log", &["crate::estimate", "crate::commands", "crate::fusion", "clap", "println!"]),
     ("src/publish", &["crate::commands", "crate::config", "crate::report", "mcap", "clap", "std::fs"]),
     ("src/report", &["crate::log", "crate::commands", "mcap", "clap", "std::fs", "println!"]),

@@ -10,7 +10,6 @@ use super::{CommandError, Outcome, note, open, say, show};
 use crate::cli::{Export, Format};
 use crate::export::{Exported, Map, csv, geojson, kml, parquet, tum};
 use crate::log::{Log, LogError, write_new};
-use crate::math::geodesy::Geodetic;
 use crate::printable::printable;
 use crate::report::ExportReport;
 use crate::source::{self, Recorded};
@@ -33,7 +32,7 @@ pub enum ExportError {
         format: &'static str,
     },
     /// The report holds the table only.
-    #[error("`--json` without an output prints the table, expected no {format} beside it")]
+    #[error("`--json` without an output holds the table itself, expected format csv, got {format}")]
     NotInJson {
         /// The format.
         format: &'static str,
@@ -75,8 +74,7 @@ pub fn export(args: &Export) -> Result<Outcome, CommandError> {
     };
     drop(bar);
     let written = Written { exported: Exported { topic: &args.topic, recorded: &recorded }, map, format };
-    let mut report =
-        ExportReport::new(args.log.display().to_string(), &args.topic, name(format), &recorded);
+    let mut report = ExportReport::new(args.log.display().to_string(), &args.topic, name(format), &recorded);
     if let Some(vertices) = written.map.as_ref().map(Map::vertices).filter(|v| *v < report.points) {
         note(args.voice, &format!("a map's lines are thinned: {vertices} of {} points", report.points));
     }
@@ -137,7 +135,7 @@ fn map(args: &Export, format: Format, log: &Log, recorded: &mut Recorded) -> Res
         if of_a_track { source::recorded_events(log, &args.topic)? } else { Default::default() };
     let new: Vec<String> = left_out.into_iter().filter(|w| !recorded.warnings.contains(w)).collect();
     recorded.warnings.extend(new);
-    Ok(Map::new(Exported { topic: &args.topic, recorded }, &events, Geodetic::from_degrees(origin)))
+    Ok(Map::new(Exported { topic: &args.topic, recorded }, &events, origin))
 }
 
 fn name(format: Format) -> &'static str {

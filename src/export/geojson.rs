@@ -20,25 +20,29 @@ pub fn write_geojson(map: &Map, out: &mut impl Write) -> io::Result<()> {
             let [r, g, b] = phase_color(phase).0;
             properties.insert("stroke".into(), format!("#{r:02x}{g:02x}{b:02x}").into());
         }
-        feature(&geometry(&line.places), properties)
+        feature(&geometry(&line.places), &properties)
     });
     let marks = map.marks.iter().map(|mark| {
         let mut properties = Object::new();
         properties.insert("name".into(), mark.name.clone().into());
         properties.extend(mark.properties.clone());
-        feature(&json!({"type": "Point", "coordinates": mark.place}), properties)
+        feature(&json!({"type": "Point", "coordinates": mark.place}), &properties)
     });
     let provenance: Object<String, Value> =
         map.provenance.iter().map(|(key, value)| (key.clone(), value.clone().into())).collect();
     // one feature a line: people look into such files, and version them
-    write!(out, "{{\"type\":\"FeatureCollection\",\"trackfuse\":{},\"features\":[", Value::Object(provenance))?;
+    write!(
+        out,
+        "{{\"type\":\"FeatureCollection\",\"trackfuse\":{},\"features\":[",
+        Value::Object(provenance)
+    )?;
     for (i, feature) in lines.chain(marks).enumerate() {
         write!(out, "{}\n{feature}", if i == 0 { "" } else { "," })?;
     }
     writeln!(out, "\n]}}")
 }
 
-fn feature(geometry: &Value, properties: Object<String, Value>) -> Value {
+fn feature(geometry: &Value, properties: &Object<String, Value>) -> Value {
     json!({"type": "Feature", "geometry": geometry, "properties": properties})
 }
 
@@ -61,7 +65,9 @@ fn cut_at_antimeridian(places: &[[f64; 3]]) -> Vec<Vec<[f64; 3]>> {
             let side = 180.0_f64.copysign(from[0]);
             let (up_to, beyond) = (side - from[0], place[0] + side);
             let share = if up_to + beyond == 0.0 { 0.0 } else { up_to / (up_to + beyond) };
-            let crossing = |longitude| [longitude, from[1] + share * (place[1] - from[1]), from[2] + share * (place[2] - from[2])];
+            let crossing = |longitude| {
+                [longitude, from[1] + share * (place[1] - from[1]), from[2] + share * (place[2] - from[2])]
+            };
             if let Some(line) = lines.last_mut() {
                 line.push(crossing(side));
             }
@@ -81,7 +87,8 @@ mod tests {
 
     #[test]
     fn a_line_across_the_antimeridian_is_cut_there_at_the_right_latitude() {
-        let there = [[179.0, 10.0, 0.0], [179.999, 10.0, 0.0], [-179.997, 10.004, -4.0], [-179.0, 11.0, -5.0]];
+        let there =
+            [[179.0, 10.0, 0.0], [179.999, 10.0, 0.0], [-179.997, 10.004, -4.0], [-179.0, 11.0, -5.0]];
         let lines = cut_at_antimeridian(&there);
         assert_eq!(lines.len(), 2);
         let ends = [lines[0][2], lines[1][0]];

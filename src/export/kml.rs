@@ -70,7 +70,8 @@ fn placemark<W: Write>(
         let shape = if places.len() == 1 { "Point" } else { "LineString" };
         let shape = xml.create_element(shape).write_inner_content(|xml| {
             text(xml, "altitudeMode", "absolute")?;
-            let places: Vec<String> = places.iter().map(|[lon, lat, alt]| format!("{lon},{lat},{alt}")).collect();
+            let places: Vec<String> =
+                places.iter().map(|[lon, lat, alt]| format!("{lon},{lat},{alt}")).collect();
             text(xml, "coordinates", &places.join(" "))
         });
         shape.map(|_| ())

@@ -52,12 +52,13 @@ pub struct MapMark {
 }
 
 impl Map {
-    /// The track and its characteristic points, on a map whose zero of x, y and z (east, north, up) is `origin`.
+    /// The track and its characteristic points, on a map whose zero of x, y and z (east, north, up) lies at a latitude
+    /// and longitude, degrees, and an altitude, m.
     #[must_use]
-    pub fn new(exported: Exported<'_>, events: &[RecordedEvent], origin: Geodetic) -> Self {
+    pub fn new(exported: Exported<'_>, events: &[RecordedEvent], origin: [f64; 3]) -> Self {
         let recorded = exported.recorded;
         let points = &recorded.track.points;
-        let frame = LocalFrame::new(origin);
+        let frame = LocalFrame::new(Geodetic::from_degrees(origin));
         let runs = runs(points, recorded.has_phases);
         let kept = kept(points, &runs);
         let t0 = recorded.origin();
@@ -91,8 +92,11 @@ impl Map {
         let mut lines: Vec<MapLine> = runs.iter().map(line).collect();
         lines.retain(|line| !line.places.is_empty());
         let mut provenance = exported.provenance();
-        let [latitude, longitude, altitude] = origin.to_degrees();
-        provenance.push(("origin_latitude_longitude_deg_altitude_m".into(), format!("{latitude}, {longitude}, {altitude}")));
+        let [latitude, longitude, altitude] = origin;
+        provenance.push((
+            "origin_latitude_longitude_deg_altitude_m".into(),
+            format!("{latitude}, {longitude}, {altitude}"),
+        ));
         let marks = events.iter().filter_map(|event| mark(event, &frame, t0)).collect();
         Self { provenance, lines, marks }
     }
@@ -118,7 +122,8 @@ fn mark(event: &RecordedEvent, frame: &LocalFrame, t0: Time) -> Option<MapMark> 
 /// Longitude and latitude to 1e-9 degrees, altitude to 0.1 mm; `None` where the numbers are too large for a place.
 fn place(frame: &LocalFrame, enu: [f64; 3]) -> Option<[f64; 3]> {
     let [latitude, longitude, altitude] = frame.to_geodetic(enu).to_degrees();
-    let place = [(longitude * 1e9).round() / 1e9, (latitude * 1e9).round() / 1e9, (altitude * 1e4).round() / 1e4];
+    let place =
+        [(longitude * 1e9).round() / 1e9, (latitude * 1e9).round() / 1e9, (altitude * 1e4).round() / 1e4];
     place.iter().all(|v| v.is_finite()).then_some(place)
 }
 
@@ -142,9 +147,8 @@ fn runs(points: &[TrackPoint], has_phases: bool) -> Vec<Run> {
     let mut runs: Vec<Run> = Vec::new();
     for (i, point) in points.iter().enumerate() {
         let joined = i > 0 && step(i) <= longest_s;
-        let same = |before: &TrackPoint| {
-            !has_phases || (before.phase, before.method) == (point.phase, point.method)
-        };
+        let same =
+            |before: &TrackPoint| !has_phases || (before.phase, before.method) == (point.phase, point.method);
         match runs.last_mut() {
             Some(run) if joined && same(&points[i - 1]) => run.end = i + 1,
             _ => runs.push(Run { first: i, end: i + 1, joined }),
@@ -188,12 +192,17 @@ mod tests {
     fn point(time_s: f64, phase: Phase) -> TrackPoint {
         let position = [time_s, (7.0 * time_s).sin(), -time_s];
         let state = State { position, position_sigma: [0.1 * time_s; 3], ..State::default() };
-        TrackPoint { time: Time::from_ns(0).plus_seconds(time_s), state, phase, method: Method::Spline, seen_by: 1 }
+        TrackPoint {
+            time: Time::from_ns(0).plus_seconds(time_s),
+            state,
+            phase,
+            method: Method::Spline,
+            seen_by: 1,
+        }
     }
 
     fn map(recorded: &Recorded) -> Map {
-        let origin = Geodetic::from_degrees([59.4, 10.5, 3.0]);
-        Map::new(Exported { topic: "/fused/track", recorded }, &[], origin)
+        Map::new(Exported { topic: "/fused/track", recorded }, &[], [59.4, 10.5, 3.0])
     }
 
     #[test]
@@ -205,9 +214,18 @@ mod tests {
         let lines: Vec<_> = map
             .lines
             .iter()
-            .map(|l| (l.properties["phase"].as_str().unwrap(), l.places.len(), l.properties["from_s"].as_f64().unwrap()))
+            .map(|l| {
+                (
+                    l.properties["phase"].as_str().unwrap(),
+                    l.places.len(),
+                    l.properties["from_s"].as_f64().unwrap(),
+                )
+            })
             .collect();
-        assert_eq!(lines, [("single", 2, 0.0), ("overlap", 3, 2.0), ("extrapolated", 2, 4.0), ("extrapolated", 2, 9.0)]);
+        assert_eq!(
+            lines,
+            [("single", 2, 0.0), ("overlap", 3, 2.0), ("extrapolated", 2, 4.0), ("extrapolated", 2, 9.0)]
+        );
         assert_eq!(map.lines[0].places[1], map.lines[1].places[0]);
         assert_eq!(map.lines[1].properties["x_sigma_max_m"], 0.3);
     }
@@ -233,10 +251,10 @@ mod tests {
 
     #[test]
     fn a_channel_without_phases_is_drawn_across_lost_samples_and_has_no_sigmas() {
-        let mut points: Vec<_> = [0.0, 1.0, 2.0, 7.0, 30.0].map(|t| point(t, Phase::Single)).into();
+        let mut points: Vec<_> = [0.0, 1.0, 2.0, 3.0, 8.0, 30.0].map(|t| point(t, Phase::Single)).into();
         points.iter_mut().for_each(|p| p.state.position_sigma = [f64::NAN; 3]);
         let map = map(&recorded(points, false));
-        assert_eq!(map.lines.iter().map(|l| l.places.len()).collect::<Vec<_>>(), [4, 1]);
+        assert_eq!(map.lines.iter().map(|l| l.places.len()).collect::<Vec<_>>(), [5, 1]);
         assert_eq!(map.lines[0].properties["x_sigma_max_m"], Value::Null);
         assert!(map.lines[0].properties.get("phase").is_none());
     }

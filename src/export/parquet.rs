@@ -31,6 +31,10 @@ pub fn write_parquet(exported: Exported<'_>, out: &mut (impl Write + Send)) -> i
     let properties = WriterProperties::builder()
         .set_created_by(concat!("trackfuse version ", env!("CARGO_PKG_VERSION")).into())
         .set_key_value_metadata(Some(metadata))
+        // words come again and again, numbers don't
+        .set_dictionary_enabled(false)
+        .set_column_dictionary_enabled("phase".into(), true)
+        .set_column_dictionary_enabled("method".into(), true)
         .build();
     let schema = schema().map_err(told)?;
     let mut file = SerializedFileWriter::new(out, Arc::new(schema), Arc::new(properties)).map_err(told)?;

@@ -10,7 +10,10 @@ use super::Exported;
 /// # Errors
 /// That of the writer.
 pub fn write_tum(exported: Exported<'_>, out: &mut impl Write) -> io::Result<()> {
-    writeln!(out, "# timestamp x y z qx qy qz qw; s, m. The orientation is the identity: no attitude is known.")?;
+    writeln!(
+        out,
+        "# timestamp x y z qx qy qz qw; s, m. The orientation is the identity: no attitude is known."
+    )?;
     for point in &exported.recorded.track.points {
         let time = point.time.to_string();
         let [x, y, z] = point.state.position;
