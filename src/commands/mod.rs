@@ -1,19 +1,23 @@
 //! The commands: each holds the order of its steps, and nothing else.
 
 mod compare;
+mod completions;
 mod export;
 mod fuse;
 mod init;
 mod inspect;
+mod man;
 mod progress;
 mod restore;
 mod simulate;
 
 pub use compare::compare;
-pub use export::export;
+pub use completions::completions;
+pub use export::{ExportError, export};
 pub use fuse::fuse;
 pub use init::init;
 pub use inspect::inspect;
+pub use man::man;
 pub use restore::restore;
 pub use simulate::simulate;
 
@@ -21,8 +25,10 @@ use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use anstyle::{AnsiColor, Style};
+
 use crate::cli::{Memory, Voice};
-use crate::config::ConfigError;
+use crate::config::{ConfigError, why_unread};
 use crate::estimate::EstimateError;
 use crate::log::{Log, LogError, ReadOptions};
 use crate::printable::printable;
@@ -31,6 +37,11 @@ use crate::simulate::SimulateError;
 use crate::source::SourceError;
 use crate::time::Time;
 use progress::Bar;
+
+/// How the words look that lines begin with, on terminals that show colours and where `NO_COLOR` is not set.
+const ERROR: Style = AnsiColor::Red.on_default().bold();
+const WARNING: Style = AnsiColor::Yellow.on_default().bold();
+const HINT: Style = AnsiColor::Cyan.on_default().bold();
 
 /// How a command ended that did what it should.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,6 +87,9 @@ pub enum CommandError {
         /// When the reference is.
         reference: String,
     },
+    /// The track can't be had in a format.
+    #[error(transparent)]
+    Export(#[from] ExportError),
     /// A scenario, with its file.
     #[error("{path}: {error}")]
     Scenario {
@@ -87,8 +101,8 @@ pub enum CommandError {
     /// What was found can't be printed.
     #[error("the result can't be printed: {0}")]
     Print(io::Error),
-    /// A file that is no log.
-    #[error("{path}: {source}")]
+    /// A scenario that can't be read.
+    #[error("scenario {path}: {}", why_unread(source))]
     File {
         /// The file.
         path: String,
@@ -106,6 +120,10 @@ impl CommandError {
             Self::Log(error) => error.hint(),
             Self::Source(error) => error.hint(),
             Self::Resolve(error) => Some(error.hint()),
+            Self::Export(error) => Some(error.hint().into()),
+            Self::File { .. } => {
+                Some("a scenario is a TOML file, such as `sample_logs/steep_climb.scenario.toml`".into())
+            }
             Self::NothingInCommon { .. } => {
                 Some("`--reference-time log` takes the reference's log times instead of its stamps".into())
             }
@@ -117,7 +135,7 @@ impl CommandError {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         let usage = match self {
-            Self::Config(_) | Self::Resolve(_) | Self::File { .. } => true,
+            Self::Config(_) | Self::Resolve(_) | Self::Export(_) | Self::File { .. } => true,
             Self::Source(SourceError::Log(error)) | Self::Log(error) => is_usage(error),
             Self::Source(error) => error.is_usage(),
             Self::Simulate(error) => is_of_scenario(error),
@@ -169,12 +187,12 @@ fn damage_of(log: &Log, strict: bool) -> Result<Vec<String>, LogError> {
 
 /// Prints why a command wrote nothing, and what to do about it, on stderr.
 pub fn explain(error: &CommandError) {
-    let mut stderr = io::stderr().lock();
+    let mut stderr = anstream::stderr().lock();
     let text = error.to_string();
     let lines: Vec<_> = text.lines().map(printable).collect();
-    let _ = writeln!(stderr, "error: {}", lines.join("\n"));
+    let _ = writeln!(stderr, "{ERROR}error:{ERROR:#} {}", lines.join("\n"));
     if let Some(hint) = error.hint() {
-        let _ = writeln!(stderr, "hint: {hint}");
+        let _ = writeln!(stderr, "{HINT}hint:{HINT:#} {hint}");
     }
 }
 
@@ -188,7 +206,7 @@ fn beside(log: &Path, what: &str) -> PathBuf {
 /// Prints what is worth knowing, and no reason to look into it.
 fn note(voice: Voice, text: &str) {
     if !voice.quiet {
-        let _ = writeln!(io::stderr(), "note: {}", printable(text));
+        let _ = writeln!(anstream::stderr(), "{HINT}note:{HINT:#} {}", printable(text));
     }
 }
 
@@ -196,8 +214,8 @@ fn note(voice: Voice, text: &str) {
 fn say(voice: Voice, text: &str, json: &impl serde::Serialize, warnings: &[String]) {
     if let Err(error) = print(voice, text, json, warnings) {
         let _ = writeln!(
-            io::stderr(),
-            "warning: the output is written, but its summary can't be printed: {error}"
+            anstream::stderr(),
+            "{WARNING}warning:{WARNING:#} the output is written, but its summary can't be printed: {error}"
         );
     }
 }
@@ -225,7 +243,7 @@ fn print(
         let json = serde_json::to_string_pretty(json).unwrap_or_default();
         writeln!(stdout, "{json}")
     } else {
-        write!(stdout, "{text}")
+        write!(anstream::AutoStream::auto(&mut stdout), "{}", coloured(text))
     };
     if voice.json || !stdout.is_terminal() {
         warn(voice, warnings);
@@ -237,12 +255,27 @@ fn print(
     }
 }
 
+/// The text, with what a person must read of it in colour.
+fn coloured(text: &str) -> String {
+    text.replace("\nwarning:", &format!("\n{WARNING}warning:{WARNING:#}"))
+}
+
+/// Prints bytes that are for other programs on stdout.
+fn put(bytes: &[u8]) -> Result<(), CommandError> {
+    let mut stdout = io::stdout().lock();
+    match stdout.write_all(bytes).and_then(|()| stdout.flush()) {
+        // a reader that went away wants no more
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(CommandError::Print(error)),
+        _ => Ok(()),
+    }
+}
+
 /// Prints warnings on stderr, unless nobody wants them there.
 fn warn(voice: Voice, warnings: &[String]) {
     if !voice.quiet {
-        let mut stderr = io::stderr().lock();
+        let mut stderr = anstream::stderr().lock();
         for warning in warnings {
-            let _ = writeln!(stderr, "warning: {}", printable(warning));
+            let _ = writeln!(stderr, "{WARNING}warning:{WARNING:#} {}", printable(warning));
         }
     }
 }

@@ -4,6 +4,8 @@
 //! metadata, so that a track can be made again.
 
 mod check;
+#[cfg(test)]
+mod guide;
 mod template;
 
 pub use template::{SourceTable, template};
@@ -21,7 +23,7 @@ use crate::log::Compression;
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
     /// The file can't be read.
-    #[error("config {path}: {source}")]
+    #[error("config {path}: {}", why_unread(source))]
     Read {
         /// The file.
         path: PathBuf,
@@ -55,12 +57,24 @@ impl ConfigError {
     #[must_use]
     pub fn hint(&self) -> Option<String> {
         match self {
+            Self::Read { .. } => {
+                Some("a config is a TOML file: `trackfuse init LOG -o CONFIG` writes one".into())
+            }
             Self::Syntax { nearest: Some(key), .. } => Some(format!("did you mean `{key}`?")),
             Self::Syntax { message, .. } if message.ends_with("expected a list of tables") => {
                 Some("two brackets begin an entry of a list: `[[source]]`, `[[characteristic_point]]`".into())
             }
             _ => None,
         }
+    }
+}
+
+/// Why a file gave no text.
+pub(crate) fn why_unread(error: &std::io::Error) -> String {
+    match error.kind() {
+        std::io::ErrorKind::InvalidData => "it is no text".into(),
+        std::io::ErrorKind::IsADirectory => "it is a directory".into(),
+        _ => error.to_string(),
     }
 }
 

@@ -48,6 +48,7 @@ mod in_order;
 mod index;
 mod interrupt;
 mod messages;
+mod nearby;
 mod new_file;
 mod old_tail;
 mod open;

@@ -183,15 +183,17 @@ pub(super) fn is_at(_: &File, _: &Path) -> bool {
 /// Refuses a name before any work is done for it.
 pub(super) fn check_name(out: &Path, force: bool) -> Result<(), LogError> {
     let path = || out.to_owned();
-    let cannot = |why: String| Err(LogError::Write { path: path(), source: io::Error::other(why) });
+    let cannot = |kind, why: String| Err(LogError::Write { path: path(), source: io::Error::new(kind, why) });
     let folder = disk::folder(out);
     if !folder.is_dir() {
-        return cannot(format!("there is no folder {}", folder.display()));
+        return cannot(io::ErrorKind::NotFound, format!("there is no folder {}", folder.display()));
     }
     match fs::symlink_metadata(out) {
-        Ok(found) if found.is_dir() => cannot("it is a directory".into()),
+        Ok(found) if found.is_dir() => cannot(io::ErrorKind::IsADirectory, "it is a directory".into()),
         // A device or a pipe would be replaced, not written to. A link is: what it leads to stays.
-        Ok(found) if !found.is_file() && !found.is_symlink() => cannot("it is no regular file".into()),
+        Ok(found) if !found.is_file() && !found.is_symlink() => {
+            cannot(io::ErrorKind::Other, "it is no regular file".into())
+        }
         Ok(_) if !force => Err(LogError::OutputExists { path: path() }),
         // What lies beside it is of this file.
         Ok(_) => undo::refuse_pending(out),

@@ -240,7 +240,7 @@ fn check_magic(file: &LogFile) -> Result<Head, LogError> {
     let start = file.bytes(0, file.len.min(MAGIC_LEN), "the magic at the start")?;
     let not_mcap = |found: String| Err(LogError::NotMcap { path: file.path.clone(), found });
     if start.is_empty() {
-        return not_mcap("the file is empty".to_owned());
+        return not_mcap(super::error::EMPTY.to_owned());
     }
     if start != MAGIC {
         if MAGIC.starts_with(&start) {

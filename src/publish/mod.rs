@@ -13,6 +13,7 @@ mod residual;
 mod scene;
 
 pub use point::track_messages;
+pub(crate) use scene::phase_color;
 
 use event::event_message;
 use log::log_messages;

@@ -3,7 +3,6 @@
 mod amount;
 mod comparison;
 mod comparison_text;
-pub mod csv;
 mod export;
 pub mod inspection;
 mod proposal;

@@ -33,6 +33,8 @@ pub struct Recorded {
     pub fix_origin: Option<[f64; 3]>,
     /// Topics that the track was made of, as the metadata has them.
     pub made_of: Vec<String>,
+    /// What the metadata says of how the track was made, but for the report, which may be long.
+    pub provenance: BTreeMap<String, String>,
     /// What a person must read, a sentence each.
     pub warnings: Vec<String>,
 }
@@ -137,13 +139,19 @@ struct PointMessage {
 }
 
 #[derive(Deserialize)]
-struct Stamp {
+pub(super) struct Stamp {
     sec: i64,
     nsec: u32,
 }
 
+impl Stamp {
+    pub(super) fn time(&self) -> Option<Time> {
+        Time::from_stamp(self.sec, self.nsec.into())
+    }
+}
+
 #[derive(Deserialize)]
-struct Xyz {
+pub(super) struct Xyz {
     x: f64,
     y: f64,
     z: f64,
@@ -184,14 +192,17 @@ fn own_track(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
         warnings.push(format!("{unreadable} messages of {topic} are left out: {reason}"));
     }
     let prefix = topic.rsplit_once('/').map_or(topic, |(prefix, _)| prefix);
-    let metadata = log.metadata(&format!("trackfuse:{prefix}"))?.unwrap_or_default();
+    let mut metadata = log.metadata(&format!("trackfuse:{prefix}"))?.unwrap_or_default();
+    let t0 = t0_of(&metadata);
+    metadata.remove("report");
     Ok(Recorded {
         track,
         sources: names.list,
         has_phases: true,
-        t0: t0_of(&metadata),
+        t0,
         fix_origin: config_of(&metadata).output.origin,
         made_of: topics_of(&metadata),
+        provenance: metadata,
         warnings,
     })
 }
@@ -221,9 +232,8 @@ impl Names {
             *frame_id = message.frame_id;
         }
         let known = |v: Option<Xyz>| v.map_or([f64::NAN; 3], <[f64; 3]>::from);
-        let time = Time::from_stamp(message.timestamp.sec, message.timestamp.nsec.into());
         Ok(TrackPoint {
-            time: time.ok_or("a timestamp past the year 2262")?,
+            time: message.timestamp.time().ok_or("a timestamp past the year 2262")?,
             state: State {
                 position: message.position.into(),
                 velocity: message.velocity.into(),
@@ -311,6 +321,7 @@ fn foreign_track(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
         t0: None,
         fix_origin: loaded.fix_origin,
         made_of: topics_among([loaded.config.position, loaded.config.velocity]),
+        provenance: BTreeMap::new(),
         warnings: loaded.warnings,
     })
 }

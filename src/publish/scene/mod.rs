@@ -32,7 +32,7 @@ const LABEL_PX: f64 = 14.0;
 const MARK_SHARE: f64 = 0.008;
 
 /// Colours that people tell apart whatever their sight (Okabe & Ito 2008), on dark and on light ground.
-fn phase_color(phase: Phase) -> ([u8; 3], &'static str) {
+pub(crate) fn phase_color(phase: Phase) -> ([u8; 3], &'static str) {
     match phase {
         Phase::Single => ([86, 180, 233], "sky blue"),
         Phase::Overlap => ([0, 158, 115], "green"),
