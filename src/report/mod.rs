@@ -5,6 +5,7 @@ mod comparison;
 mod comparison_text;
 pub mod csv;
 mod export;
+pub mod html;
 pub mod inspection;
 mod proposal;
 mod registration;
