@@ -109,6 +109,6 @@ mod tests {
     fn numbers_too_large_to_be_rounded_stay_as_they_are() {
         let huge = [1e300, -1e300];
         let columns = Columns::of(&[Some(0), Some(1)], &[&|i| huge[i]]);
-        assert_eq!(serde_json::to_string(&columns).expect("JSON"), "[[1e300,-1e300]]");
+        assert_eq!(serde_json::to_string(&columns).expect("JSON"), "[[1e+300,-1e+300]]");
     }
 }

@@ -7,7 +7,9 @@ use super::secured::{embedded, policy};
 use super::{Columns, Plot, Space, Table};
 use crate::printable::printable;
 
-const UPLOT: &str = include_str!("uplot/uPlot.iife.min.js");
+/// uPlot with its licence, which asks to go with every copy.
+const UPLOT: &str =
+    concat!("/*\n", include_str!("uplot/LICENSE"), "*/\n", include_str!("uplot/uPlot.iife.min.js"));
 const UPLOT_STYLE: &str = include_str!("uplot/uPlot.min.css");
 const STYLE: &str = include_str!("page.css");
 /// In the order in which they need each other.

@@ -51,7 +51,7 @@ function prepared(plot, tables) {
       }
     } else {
       const stroke = () => ink(s.ink);
-      const isDots = s.style === "dots", size = s.ink.of === "plain" ? 6 : 3;
+      const isDots = s.style === "dots", size = s.ink.of === "plain" ? 6 : y.length > 1000 ? 2 : 3;
       add(x, y, {
         label: s.label, stroke, width: isDots ? 0 : 1.5, paths: isDots ? () => null : undefined,
         points: { show: isDots, size, width: 0, fill: stroke, stroke },
