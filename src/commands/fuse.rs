@@ -103,16 +103,8 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         log_start: resolve::log_start(&log, shift_s),
     };
     let metadata = metadata(&log, &config, &report)?;
-    let subject = html::fusion::Parts {
-        report: &report,
-        fusion: &fusion,
-        sources: &sources,
-        origin,
-        t0,
-        provenance: &html_report::provenance(&metadata),
-        config: metadata.entries.get("config").map_or("", String::as_str),
-    };
-    let page = html_report::prepare(args, subject)?;
+    let parts = html::fusion::Parts { report: &report, fusion: &fusion, sources: &sources, origin, t0 };
+    let page = html_report::prepare(args, parts, &metadata)?;
     let mut appender = Appender::begin(&log, &destination, &channels, config.output.compression)?;
     appender.leave_out(bad_chunks.into_iter().chain(read.bad_chunks()));
     bar.doing("writing the track");
@@ -125,21 +117,17 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     }
     appender.write_metadata(&metadata)?;
     appender.finish()?;
-    if let Some(page) = page {
-        page.publish().map_err(|source| CommandError::ReportLost { log: output_name.clone(), source })?;
-    }
+    html_report::publish(page, &output_name)?;
     drop(bar);
-    let mut files = if args.in_place {
-        format!("{input_name}, in place")
-    } else {
-        format!("{input_name} -> {output_name}")
-    };
-    if let Some(page) = &args.report {
-        files.push_str(&format!(", {}", page.display()));
-    }
-    let text = format!("{files}\n\n{text}");
+    let text = format!("{}\n\n{text}", files(args, &input_name, &output_name));
     say(args.voice, &text, &report, &warnings);
     Ok(if warnings.is_empty() { Outcome::Done } else { Outcome::Warned })
+}
+
+/// What was read and what was written.
+fn files(args: &Fuse, input: &str, output: &str) -> String {
+    let log = if args.in_place { format!("{input}, in place") } else { format!("{input} -> {output}") };
+    args.report.as_ref().map_or(log.clone(), |page| format!("{log}, {}", page.display()))
 }
 
 /// Refuses damage that showed when the sources were read, where only a whole log will do.

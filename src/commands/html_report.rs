@@ -26,15 +26,26 @@ pub(super) fn check(args: &Fuse, log: &Log, destination: &Destination) -> Result
 }
 
 /// Writes the page, all but its name.
-pub(super) fn prepare(args: &Fuse, subject: html::fusion::Parts<'_>) -> Result<Option<Prepared>, LogError> {
+pub(super) fn prepare(
+    args: &Fuse,
+    parts: html::fusion::Parts<'_>,
+    metadata: &NewMetadata,
+) -> Result<Option<Prepared>, LogError> {
     let Some(out) = &args.report else { return Ok(None) };
-    let page = html::fusion::page(subject).render();
+    let config = metadata.entries.get("config").map_or("", String::as_str);
+    let page = html::fusion::page(parts, &provenance(metadata), config).render();
     let written = |source| LogError::Write { path: out.clone(), source };
     Prepared::new(out, args.force, |file| file.write_all(page.as_bytes()).map_err(written)).map(Some)
 }
 
+/// Gives the page its name, now that the log has its own.
+pub(super) fn publish(page: Option<Prepared>, log: &str) -> Result<(), CommandError> {
+    let lost = |source| CommandError::ReportLost { log: log.to_owned(), source };
+    page.map_or(Ok(()), |page| page.publish().map_err(lost))
+}
+
 /// Where the track comes from, as the log's metadata say it, and the command as it was given.
-pub(super) fn provenance(metadata: &NewMetadata) -> Vec<(String, String)> {
+fn provenance(metadata: &NewMetadata) -> Vec<(String, String)> {
     let given = std::env::args_os().skip(1).map(|arg| shell_word(&arg.to_string_lossy()));
     let command = std::iter::once("trackfuse".to_owned()).chain(given).collect::<Vec<_>>().join(" ");
     let shown = [

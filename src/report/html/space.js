@@ -114,25 +114,25 @@ function drawSpace(place, space, tables) {
     for (let axis = 0; axis < 3; axis++) {
       const [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
       // the edge with the numbers lies at the border of the picture
-      const [na, nb] = axis === 2 ? [a, b] : [axis === 0 ? 1 : 0, 2];
-      const edge = back.slice();
-      edge[na] = front[na];
+      const near = axis === 0 ? 1 : 0, edge = back.slice();
+      edge[near] = front[near];
       const end = (v) => edge.map((e, i) => (i === axis ? v : e));
       for (const [p, q] of [[back[a], back[b]], [front[a], back[b]], [back[a], front[b]]]) {
         const corner = (v) => [0, 1, 2].map((i) => (i === axis ? v : i === a ? p : q));
         line([corner(low[axis]), corner(high[axis])], color("line"), 1);
       }
-      if (turned(axis) * (high[axis] - low[axis]) * scale < 40) continue;
       const side = to(end(centre[axis])), middle = to(centre);
       const out = [Math.sign(side[0] - middle[0]) || 1, Math.sign(side[1] - middle[1]) || 1];
       const length = turned(axis) * (high[axis] - low[axis]) * scale;
       const isUpright = Math.abs(axes.up[axis]) > Math.abs(axes.right[axis]);
       Object.assign(ctx, { fillStyle: color("faint"), textBaseline: "middle", textAlign: isUpright ? (out[0] > 0 ? "left" : "right") : "center" });
-      const label = (v, text, away) => {
+      const label = (v, text, away, above = 0) => {
         const [x, y] = to(end(v));
-        ctx.fillText(text, x + (isUpright ? away * out[0] : 0), y + (isUpright ? 0 : away * out[1]));
+        ctx.fillText(text, x + (isUpright ? away * out[0] : 0), y + (isUpright ? -above : away * out[1]));
       };
-      for (const v of steps(low[axis], high[axis], Math.max(2, Math.min(6, length / 60)))) {
+      // an edge too short for numbers has its name, one that points at the reader has none
+      const numbers = length < 40 ? [] : steps(low[axis], high[axis], Math.max(2, Math.min(6, length / 60)));
+      for (const v of numbers) {
         const [x, y] = to(end(v)), dx = isUpright ? 4 * out[0] : 0, dy = isUpright ? 0 : 4 * out[1];
         Object.assign(ctx, { strokeStyle: color("faint"), lineWidth: 1 });
         ctx.beginPath();
@@ -140,10 +140,10 @@ function drawSpace(place, space, tables) {
         ctx.lineTo(x + dx, y + dy);
         ctx.stroke();
         label(v, tick(v), isUpright ? 7 : 12);
-        if (nb === undefined) break;
       }
       ctx.fillStyle = color("text");
-      label(high[axis], "xyz"[axis] + " m", isUpright ? 7 : 26);
+      const at = numbers.length ? high[axis] : centre[axis];
+      if (length > 12) label(at, "xyz"[axis] + " m", isUpright ? 7 : numbers.length ? 26 : 14, numbers.length ? 12 : 0);
     }
   }
 

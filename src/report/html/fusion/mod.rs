@@ -27,10 +27,6 @@ pub struct Parts<'a> {
     pub origin: Time,
     /// T0, from which the page's times count.
     pub t0: Time,
-    /// Where it comes from: what, and its value.
-    pub provenance: &'a [(String, String)],
-    /// The config that makes the same track again, TOML.
-    pub config: &'a str,
 }
 
 impl Parts<'_> {
@@ -40,9 +36,9 @@ impl Parts<'_> {
     }
 }
 
-/// The page.
+/// The page; `provenance` tells where the track comes from, what and its value, and `config` makes it again, TOML.
 #[must_use]
-pub fn page(parts: Parts<'_>) -> Page {
+pub fn page(parts: Parts<'_>, provenance: &[(String, String)], config: &str) -> Page {
     let report = parts.report;
     let mut drawing = Drawing::new(parts);
     let sections = vec![
@@ -58,7 +54,7 @@ pub fn page(parts: Parts<'_>) -> Page {
         section("errors", "Estimated errors", tables::errors(report)),
         section("points", "Characteristic points", vec![tables::characteristic_points(report)]),
         section("extrapolation", "Hold-out of the extrapolation", tables::holdout(report)),
-        section("provenance", "Provenance", tables::provenance(&parts)),
+        section("provenance", "Provenance", tables::provenance(report, provenance, config)),
     ];
     Page {
         title: file_name(&report.input).into(),

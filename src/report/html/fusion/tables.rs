@@ -1,6 +1,5 @@
 //! The report's numbers as tables: those of `--json`, for people.
 
-use super::Parts;
 use crate::report::html::table::NONE;
 use crate::report::html::{Column, Part, Table, plus_minus, value};
 use crate::report::text::short;
@@ -265,14 +264,13 @@ pub(super) fn holdout(report: &Report) -> Vec<Part> {
 }
 
 /// What made the page, of what.
-pub(super) fn provenance(parts: &Parts<'_>) -> Vec<Part> {
-    let report = parts.report;
+pub(super) fn provenance(report: &Report, known: &[(String, String)], config: &str) -> Vec<Part> {
     let track = &report.track;
     let mut rows: Vec<Vec<String>> = Vec::new();
     let mut say = |what: &str, value: String| rows.push(vec![what.to_owned(), value]);
     say("input", report.input.clone());
     say("output", report.output.clone());
-    for (what, value) in parts.provenance {
+    for (what, value) in known {
         say(what, value.clone());
     }
     say("T0, ns", report.t0_ns.clone());
@@ -297,6 +295,6 @@ pub(super) fn provenance(parts: &Parts<'_>) -> Vec<Part> {
     vec![
         Part::Table(table),
         Part::Text("The config that makes this track again:".into()),
-        Part::Code(parts.config.to_owned()),
+        Part::Code(config.to_owned()),
     ]
 }
