@@ -1,5 +1,6 @@
 //! The answer in two sentences.
 
+use super::tables::decimals;
 use crate::report::html::{plus_minus, value};
 use crate::report::{PhaseReport, Report, SourceReport};
 use crate::time::Time;
@@ -40,6 +41,11 @@ fn registered(report: &Report) -> &'static str {
     if report.registration.is_some() { ", registered to the datum" } else { ", not registered" }
 }
 
+/// To the millimetre, and what is less to two digits.
+fn metres(v: f64) -> String {
+    value(v, if v < 1e-3 { decimals(v) } else { 3 })
+}
+
 /// From the smallest to the largest of the stretches of this phase.
 fn sigma(phase: Phase, phases: &[PhaseReport]) -> Option<String> {
     let of_phase = || phases.iter().filter(|p| p.phase == phase.name());
@@ -48,8 +54,8 @@ fn sigma(phase: Phase, phases: &[PhaseReport]) -> Option<String> {
     let range = match () {
         () if low > high && of_phase().next().is_none() => return None,
         () if low > high => "unknown".into(),
-        () if value(low, 3) == value(high, 3) => format!("{} m", value(low, 3)),
-        () => format!("{} to {} m", value(low, 3), value(high, 3)),
+        () if metres(low) == metres(high) => format!("{} m", metres(low)),
+        () => format!("{} to {} m", metres(low), metres(high)),
     };
     let place = match phase {
         Phase::Single => "where one source sees",

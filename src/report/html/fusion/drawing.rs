@@ -13,8 +13,6 @@ pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 const TRACK_ROWS: usize = 4000;
 const SAMPLE_ROWS: usize = 16_000;
 const SERIES_ROWS: usize = 4000;
-/// Most rejected samples that are marked.
-const REJECTED_ROWS: usize = 1000;
 
 /// Columns of the track: time, then three each.
 const POSITION: usize = 1;
@@ -48,7 +46,7 @@ impl<'a> Drawing<'a> {
         }
         drawing.rejected = Quantity::ALL.map(|q| {
             let found = parts.fusion.registered.as_ref()?;
-            let of_quantity = found.rejected.iter().filter(|r| r.quantity == q).take(REJECTED_ROWS);
+            let of_quantity = found.rejected.iter().filter(|r| r.quantity == q);
             let mut rejected: Vec<Sample> = of_quantity
                 .filter_map(|r| {
                     let series = parts.sources[r.source].series(q);

@@ -178,7 +178,7 @@ fn unknowns(unknowns: &[UnknownReport]) -> Table {
 }
 
 /// Such that a sigma has two significant digits.
-fn decimals(sigma: f64) -> usize {
+pub(super) fn decimals(sigma: f64) -> usize {
     if sigma > 0.0 && sigma.is_finite() { (1.0 - sigma.log10().floor()).clamp(0.0, 6.0) as usize } else { 3 }
 }
 
