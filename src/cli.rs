@@ -97,6 +97,7 @@ fn bytes(text: &str) -> Result<u64, String> {
   trackfuse fuse dive.mcap --config dive.toml    names sources, heights, horizon, ...
   trackfuse fuse dive.mcap --in-place            adds to dive.mcap: needs no second copy of a large log
   trackfuse fuse dive.mcap --sidecar track.mcap  writes the new channels only, for viewers that merge logs
+  trackfuse fuse dive.mcap --report dive.html    writes a report with plots for the browser, too
 
 Exit codes: 0 done; 1 failed, nothing written; 2 usage or config wrong, sources ambiguous, output
 exists; 3 done, with warnings that a person must read")]
@@ -115,6 +116,9 @@ pub struct Fuse {
     /// Write the new channels only, as a log of their own
     #[arg(long, value_name = "OUT", conflicts_with = "output")]
     pub sidecar: Option<PathBuf>,
+    /// Write a report with plots beside it: one page for browser and paper, which needs no network
+    #[arg(long, value_name = "FILE.html")]
+    pub report: Option<PathBuf>,
     /// Replace an existing output
     #[arg(long)]
     pub force: bool,

@@ -22,6 +22,7 @@ mod cli {
     mod output;
     mod readme;
     mod real_logs;
+    mod report;
     mod restore;
     mod sources;
     mod trial;

@@ -5,13 +5,13 @@ use std::io::Read;
 use sha2::{Digest, Sha256};
 
 use super::progress::Bar;
-use super::{CommandError, Outcome, beside, damage_of, note, say};
+use super::{CommandError, Outcome, beside, damage_of, html_report, note, say};
 use crate::cli::Fuse;
 use crate::config::Config;
 use crate::fusion::{self, Fusion};
 use crate::log::{Appender, Destination, Log, LogError, MessagesRead, NewMetadata, ReadOptions, put_back};
 use crate::publish::{Context, Topic, messages};
-use crate::report::{self, Report};
+use crate::report::{self, Report, html};
 use crate::resolve;
 use crate::sample::Source;
 use crate::source::{self, Recognised, Samples};
@@ -44,6 +44,7 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     let destination = destination(args);
     let channels = Topic::ALL.map(|topic| topic.channel(&config.output.prefix));
     Appender::check(&log, &destination, &channels)?;
+    html_report::check(args, &log, &destination)?;
 
     let named = !config.source.is_empty();
     let Recognised { unused, warnings: of_sources, bad_chunks, .. } = choose_sources(&log, &mut config)?;
@@ -102,6 +103,8 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         log_start: resolve::log_start(&log, shift_s),
     };
     let metadata = metadata(&log, &config, &report)?;
+    let parts = html::fusion::Parts { report: &report, fusion: &fusion, sources: &sources, origin, t0 };
+    let page = html_report::prepare(args, parts, &metadata)?;
     let mut appender = Appender::begin(&log, &destination, &channels, config.output.compression)?;
     appender.leave_out(bad_chunks.into_iter().chain(read.bad_chunks()));
     bar.doing("writing the track");
@@ -114,15 +117,17 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     }
     appender.write_metadata(&metadata)?;
     appender.finish()?;
+    html_report::publish(page, &output_name)?;
     drop(bar);
-    let files = if args.in_place {
-        format!("{input_name}, in place")
-    } else {
-        format!("{input_name} -> {output_name}")
-    };
-    let text = format!("{files}\n\n{text}");
+    let text = format!("{}\n\n{text}", files(args, &input_name, &output_name));
     say(args.voice, &text, &report, &warnings);
     Ok(if warnings.is_empty() { Outcome::Done } else { Outcome::Warned })
+}
+
+/// What was read and what was written.
+fn files(args: &Fuse, input: &str, output: &str) -> String {
+    let log = if args.in_place { format!("{input}, in place") } else { format!("{input} -> {output}") };
+    args.report.as_ref().map_or(log.clone(), |page| format!("{log}, {}", page.display()))
 }
 
 /// Refuses damage that showed when the sources were read, where only a whole log will do.

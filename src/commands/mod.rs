@@ -4,6 +4,7 @@ mod compare;
 mod completions;
 mod export;
 mod fuse;
+mod html_report;
 mod init;
 mod inspect;
 mod man;
@@ -101,6 +102,20 @@ pub enum CommandError {
     /// What was found can't be printed.
     #[error("the result can't be printed: {0}")]
     Print(io::Error),
+    /// Two outputs would bear one name.
+    #[error("the log and its report can't both be {path:?}")]
+    OneName {
+        /// That name.
+        path: PathBuf,
+    },
+    /// The log is written, and its report can't get its name.
+    #[error("{log} is written, but its report is not: {source}")]
+    ReportLost {
+        /// The log.
+        log: String,
+        /// Why the report isn't.
+        source: LogError,
+    },
     /// A scenario that can't be read.
     #[error("scenario {path}: {}", why_unread(source))]
     File {
@@ -135,14 +150,16 @@ impl CommandError {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         let usage = match self {
-            Self::Config(_) | Self::Resolve(_) | Self::Export(_) | Self::File { .. } => true,
+            Self::Config(_) | Self::Resolve(_) | Self::OneName { .. } | Self::Export(_) | Self::File { .. } => true,
             Self::Source(SourceError::Log(error)) | Self::Log(error) => is_usage(error),
             Self::Source(error) => error.is_usage(),
             Self::Simulate(error) => is_of_scenario(error),
             Self::Scenario { error, .. } => is_of_scenario(error),
-            Self::Print(_) | Self::Estimate(_) | Self::NotFinite { .. } | Self::NothingInCommon { .. } => {
-                false
-            }
+            Self::Print(_)
+            | Self::Estimate(_)
+            | Self::NotFinite { .. }
+            | Self::ReportLost { .. }
+            | Self::NothingInCommon { .. } => false,
         };
         if usage { 2 } else { 1 }
     }

@@ -73,7 +73,7 @@ pub use index::{Index, LeftOut, Schema};
 pub use interrupt::{INTERRUPTION, Interruption};
 pub use mcap::records::{AttachmentIndex, Channel, ChunkIndex, MetadataIndex, Statistics};
 pub use messages::{Message, MessagesRead, OwnedMessage, bad_chunks, passed_over};
-pub use new_file::write_new;
+pub use new_file::{Prepared, check_name, write_new};
 pub use open::Log;
 pub use options::{Observer, Progress, ReadOptions, Work};
 pub use output::Destination;

@@ -32,16 +32,51 @@ pub fn write_new<E: From<LogError>>(
     force: bool,
     write: impl FnOnce(&mut BufWriter<NamedTempFile>) -> Result<(), E>,
 ) -> Result<u64, E> {
-    let written = |source| LogError::Write { path: out.to_owned(), source };
-    check_name(out, force)?;
-    let _writing = Writing::begin();
-    let mut file = BufWriter::new(temporary_beside(out, None)?);
-    write(&mut file)?;
-    let len = file.stream_position().map_err(written)?;
-    interrupt::check(out)?;
-    let file = file.into_inner().map_err(|e| written(e.into_error()))?;
-    publish(file, out, force)?;
+    let prepared = Prepared::new(out, force, write)?;
+    let len = prepared.len;
+    prepared.publish()?;
     Ok(len)
+}
+
+/// A new file, all of it on the disk, that doesn't bear its name yet; dropped, it leaves nothing.
+#[derive(Debug)]
+pub struct Prepared {
+    file: NamedTempFile,
+    out: PathBuf,
+    force: bool,
+    len: u64,
+    _writing: Writing,
+}
+
+impl Prepared {
+    /// Writes the file's content.
+    ///
+    /// # Errors
+    /// As [`write_new`].
+    pub fn new<E: From<LogError>>(
+        out: &Path,
+        force: bool,
+        write: impl FnOnce(&mut BufWriter<NamedTempFile>) -> Result<(), E>,
+    ) -> Result<Self, E> {
+        let written = |source| LogError::Write { path: out.to_owned(), source };
+        check_name(out, force)?;
+        let writing = Writing::begin();
+        let mut file = BufWriter::new(temporary_beside(out, None)?);
+        write(&mut file)?;
+        let len = file.stream_position().map_err(written)?;
+        interrupt::check(out)?;
+        let file = file.into_inner().map_err(|e| written(e.into_error()))?;
+        disk::sync(file.as_file()).map_err(written)?;
+        Ok(Self { file, out: out.to_owned(), force, len, _writing: writing })
+    }
+
+    /// Gives it its name.
+    ///
+    /// # Errors
+    /// As [`write_new`].
+    pub fn publish(self) -> Result<(), LogError> {
+        publish(self.file, &self.out, self.force)
+    }
 }
 
 /// Syncs and names a file, and syncs its directory.
@@ -181,7 +216,10 @@ pub(super) fn is_at(_: &File, _: &Path) -> bool {
 }
 
 /// Refuses a name before any work is done for it.
-pub(super) fn check_name(out: &Path, force: bool) -> Result<(), LogError> {
+///
+/// # Errors
+/// [`LogError::OutputExists`] without `force`; [`LogError::Write`] where no file can be.
+pub fn check_name(out: &Path, force: bool) -> Result<(), LogError> {
     let path = || out.to_owned();
     let cannot = |kind, why: String| Err(LogError::Write { path: path(), source: io::Error::new(kind, why) });
     let folder = disk::folder(out);

@@ -4,6 +4,7 @@ mod amount;
 mod comparison;
 mod comparison_text;
 mod export;
+pub mod html;
 pub mod inspection;
 mod proposal;
 mod registration;
