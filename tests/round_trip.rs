@@ -10,6 +10,8 @@
 
 #[path = "round_trip/damage.rs"]
 mod damage;
+#[path = "round_trip/endings.rs"]
+mod endings;
 #[path = "round_trip/hostile.rs"]
 mod hostile;
 #[path = "round_trip/raw.rs"]

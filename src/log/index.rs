@@ -99,7 +99,7 @@ pub struct Index {
     /// Where the data section ends: at the `DataEnd` record, or behind the last whole record of a log that is
     /// cut off. The bytes before it never change.
     pub data_end: u64,
-    /// Whether the log is cut off before its `DataEnd` record.
+    /// Whether no `DataEnd` record stands at the data section's end: the log is cut off there, or has none.
     pub is_cut: bool,
     /// Where the summary begins, `None` where there is none, or none that can be trusted.
     pub summary_start: Option<u64>,

@@ -109,9 +109,9 @@ fn counts(index: &Index) -> LeftOut {
 /// all that it holds.
 fn tear(index: &mut Index) {
     let data_end = index.data_end;
-    let Some(chunk) = index.chunks.last_mut().filter(|_| index.is_cut && index.cut_chunk.is_none()) else {
-        return;
-    };
+    // A summary that can be trusted names them all.
+    let may_be_torn = index.is_cut && index.cut_chunk.is_none() && index.summary_start.is_none();
+    let Some(chunk) = index.chunks.last_mut().filter(|_| may_be_torn) else { return };
     if chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length == data_end {
         let torn = TornChunk { whole: chunk.clone() };
         chunk.message_index_offsets.clear();

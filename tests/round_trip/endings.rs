@@ -1,0 +1,98 @@
+//! Logs whose end is not as it should be, though all before it is.
+
+use std::fs;
+use std::io::Read;
+
+use mcap::WriteOptions;
+use trackfuse::log::{LogError, ReadOptions, Visibility};
+
+use super::damage::log_of as chunked_log;
+use super::hostile::{Opened, channel, chunk, message, opened, opened_with};
+use super::raw::{summary_start, told_by_index, told_by_stream, u64_at};
+
+/// Some chunks, and where their data section ends.
+fn whole() -> (Vec<u8>, usize) {
+    let bytes = chunked_log(WriteOptions::new().compression(None), 12, 20, 150);
+    let data_end = summary_start(&bytes) - 13;
+    (bytes, data_end)
+}
+
+/// Puts a right checksum of the summary into the footer.
+fn sum_up(bytes: &mut [u8]) {
+    let (start, end) = (summary_start(bytes), bytes.len() - 12);
+    let crc = crc32fast::hash(&bytes[start..end]);
+    bytes[end..end + 4].copy_from_slice(&crc.to_le_bytes());
+}
+
+/// The log without its `DataEnd`, and a footer that knows of it.
+fn without_data_end() -> (Vec<u8>, usize) {
+    let (mut bytes, data_end) = whole();
+    bytes.drain(data_end..data_end + 13);
+    for field in [28, 20] {
+        let at = bytes.len() - field;
+        let start = u64_at(&bytes, at) - 13;
+        bytes[at..at + 8].copy_from_slice(&start.to_le_bytes());
+    }
+    sum_up(&mut bytes);
+    (bytes, data_end)
+}
+
+/// Adds to the log: readers from record to record and by index find the messages `old` and the new one, and nothing
+/// is wrong with the output.
+fn assert_all_found(log: &Opened, old: &[u8], what: &str) -> Vec<u8> {
+    let output = fs::read(log.append()).unwrap();
+    let told = told_by_stream(&output);
+    let expected: Vec<_> = told_by_stream(old);
+    assert_eq!(told[..told.len() - 1], expected, "{what}");
+    let mut sorted = told;
+    sorted.sort();
+    assert_eq!(told_by_index(&output), sorted, "{what}");
+    assert_eq!(opened(output.clone()).said(), "", "{what}");
+    output
+}
+
+#[test]
+fn without_the_record_that_ends_the_data_section_a_right_summary_is_used_and_the_records_tell_the_end() {
+    let (gone, data_end) = without_data_end();
+    let flipped = |at: usize, mask: u8| {
+        let mut bytes = whole().0;
+        bytes[data_end + at] ^= mask;
+        bytes
+    };
+    // Gone, of another opcode (a message index, a private record), of another length.
+    for (what, bytes) in [
+        ("gone", gone),
+        ("a message index", flipped(0, 0x08)),
+        ("private", flipped(0, 0xf0)),
+        ("no record", flipped(0, 0x0f)),
+        ("shorter", flipped(1, 4)),
+        ("too long", flipped(8, 0x40)),
+    ] {
+        let log = opened(bytes.clone());
+        assert!(log.said().contains("expected the end of the data section"), "{what}: {}", log.said());
+        assert_eq!(log.log.index().data_end as usize, data_end, "{what}");
+        assert!(log.log.index().summary_start.is_some() && log.log.index().is_cut, "{what}");
+        let mut tail = Vec::new();
+        log.log.tail().read_to_end(&mut tail).unwrap();
+        assert!(tail == bytes[data_end..], "{what}");
+        let output = assert_all_found(&log, &whole().0, what);
+
+        let output = opened(output);
+        let restored = output.dir.path().join("restored.mcap");
+        output.log.restore_to(&output.log.additions().unwrap()[0], &restored, false).unwrap();
+        assert!(fs::read(restored).unwrap() == bytes, "{what}");
+    }
+}
+
+#[test]
+fn garbage_in_the_data_section_and_no_record_that_ends_it_cost_nothing_that_a_right_summary_names() {
+    let (mut bytes, _) = without_data_end();
+    let last = opened(bytes.clone()).log.index().chunks.last().unwrap().clone();
+    // The record behind the first chunk claims more than there is.
+    let first = opened(bytes.clone()).log.index().chunks[0].clone();
+    let at = (first.chunk_start_offset + first.chunk_length) as usize;
+    bytes[at + 8] = 0x7f;
+    let log = opened(bytes);
+    assert!(log.log.index().chunks.contains(&last), "{}", log.said());
+    assert!(!told_by_index(&fs::read(log.append()).unwrap()).is_empty());
+}
