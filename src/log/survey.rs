@@ -116,6 +116,9 @@ fn tear(index: &mut Index) {
         let torn = TornChunk { whole: chunk.clone() };
         chunk.message_index_offsets.clear();
         chunk.message_index_length = 0;
+        let start = torn.whole.chunk_start_offset;
+        // It is indexed anew, with all its message indexes.
+        index.summary.retain(|record| record.chunk_start_offset() != Some(start));
         index.torn_chunk = Some(torn);
     }
 }

@@ -96,3 +96,19 @@ fn garbage_in_the_data_section_and_no_record_that_ends_it_cost_nothing_that_a_ri
     assert!(log.log.index().chunks.contains(&last), "{}", log.said());
     assert!(!told_by_index(&fs::read(log.append()).unwrap()).is_empty());
 }
+
+#[test]
+fn a_log_cut_off_right_behind_a_chunk_of_time_0_or_without_messages_is_indexed_once() {
+    let (bytes, data_end) = whole();
+    for (what, records) in [
+        ("no record", vec![]),
+        ("a channel", channel(99, 0, b"/late")),
+        ("messages", [channel(99, 0, b"/late"), message(99, 0), message(99, 0)].concat()),
+    ] {
+        let cut = [&bytes[..data_end], &chunk(records.len() as u64, b"", &records)].concat();
+        let log = opened(cut.clone());
+        assert_eq!(log.log.visibility(), Visibility::Indexed, "{what}");
+        let end = [&[0x0f, 4][..], &[0; 7 + 4], &[0x02, 20], &[0; 7 + 20], b"\x89MCAP0\r\n"].concat();
+        assert_all_found(&log, &[cut, end].concat(), what);
+    }
+}
