@@ -23,6 +23,7 @@ mod cli {
     mod readme;
     mod real_logs;
     mod restore;
+    mod restore_of_changed;
     mod sources;
     mod trial;
     mod trial_log;

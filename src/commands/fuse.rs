@@ -112,7 +112,7 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
             data: &message.data,
         })?;
     }
-    appender.write_metadata(&metadata)?;
+    appender.add_metadata(metadata);
     appender.finish()?;
     drop(bar);
     let files = if args.in_place {

@@ -19,18 +19,19 @@ pub fn restore(args: &Restore) -> Result<Outcome, CommandError> {
         None => put_back(&args.log)?,
     };
     let report = match half_done {
-        Some(len) => report(args, args.output.as_deref().unwrap_or(&args.log), len, true, [0, 0]),
+        Some(len) => RestoreReport { cut_off_run: true, ..report(args, args.output.as_deref(), len) },
         None => take_off(args)?,
     };
-    say(args.voice, &text(&report), &report, &[]);
-    Ok(Outcome::Done)
+    say(args.voice, &text(&report), &report, &report.warnings);
+    Ok(if report.warnings.is_empty() { Outcome::Done } else { Outcome::Warned })
 }
 
 fn take_off(args: &Restore) -> Result<RestoreReport, CommandError> {
     let log = if args.in_place { Log::open_in_place(&args.log)? } else { Log::open(&args.log)? };
+    let mut warnings = Vec::new();
     let additions = log.additions()?;
     let kept = if args.last { additions.len() - 1 } else { 0 };
-    let (addition, counts) = (&additions[kept], [additions.len() - kept, kept]);
+    let addition = &additions[kept];
     let output = match &args.output {
         _ if args.in_place => args.log.clone(),
         Some(out) => out.clone(),
@@ -40,25 +41,29 @@ fn take_off(args: &Restore) -> Result<RestoreReport, CommandError> {
         log.restore_in_place(addition)?;
     } else {
         log.restore_to(addition, &output, args.force)?;
+        warnings.extend(addition.appended_by_others.map(|at| {
+            format!("what another program appended to the log, from offset {at} on, is not in the original")
+        }));
     }
-    Ok(report(args, &output, addition.original_len, false, counts))
+    Ok(RestoreReport {
+        additions_taken_off: additions.len() - kept,
+        additions_left: kept,
+        warnings,
+        ..report(args, Some(&output), addition.original_len)
+    })
 }
 
-fn report(
-    args: &Restore,
-    output: &Path,
-    len: u64,
-    half_done: bool,
-    [off, left]: [usize; 2],
-) -> RestoreReport {
+/// Of an output of `len` bytes, in place where it is none of its own.
+fn report(args: &Restore, output: Option<&Path>, len: u64) -> RestoreReport {
     RestoreReport {
         version: env!("CARGO_PKG_VERSION").into(),
         log: args.log.display().to_string(),
-        output: output.display().to_string(),
+        output: output.unwrap_or(&args.log).display().to_string(),
         bytes: len.to_string(),
-        cut_off_run: half_done,
-        additions_taken_off: off,
-        additions_left: left,
+        cut_off_run: false,
+        additions_taken_off: 0,
+        additions_left: 0,
+        warnings: Vec::new(),
     }
 }
 
@@ -71,5 +76,6 @@ fn text(report: &RestoreReport) -> String {
     };
     let RestoreReport { log, output, bytes, .. } = report;
     let files = if log == output { format!("{log}, in place") } else { format!("{log} -> {output}") };
-    printable(&format!("{files}: {what}, {bytes} bytes")).into_owned() + "\n"
+    let warnings = report.warnings.iter().map(|warning| format!("warning: {}\n", printable(warning)));
+    printable(&format!("{files}: {what}, {bytes} bytes")).into_owned() + "\n" + &warnings.collect::<String>()
 }

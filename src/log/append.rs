@@ -53,6 +53,7 @@ pub struct Appender<'a> {
     summary: Vec<SummaryRecord>,
     statistics: Statistics,
     messages: u64,
+    metadata: Vec<NewMetadata>,
     /// How readers will find it all.
     visibility: Visibility,
     /// Chunks of the log that can't be decoded.
@@ -85,6 +86,7 @@ impl<'a> Appender<'a> {
             summary: Vec::new(),
             statistics: statistics_of(&old),
             messages: 0,
+            metadata: Vec::new(),
             old,
             visibility: if is_sidecar { Visibility::Indexed } else { log.visibility() },
             left_out: BTreeSet::new(),
@@ -144,12 +146,13 @@ impl<'a> Appender<'a> {
         self.left_out.extend(chunk_starts);
     }
 
-    /// Adds a metadata record.
-    ///
-    /// # Errors
-    /// As [`Appender::write`].
-    pub fn write_metadata(&mut self, metadata: &NewMetadata) -> Result<(), LogError> {
-        let NewMetadata { name, entries } = metadata.clone();
+    /// Adds a metadata record, which will stand behind all messages. Its name should begin with `trackfuse:`: the
+    /// way back takes records of other names, and what stands behind the last of these, for another program's.
+    pub fn add_metadata(&mut self, metadata: NewMetadata) {
+        self.metadata.push(metadata);
+    }
+
+    fn put_metadata(&mut self, NewMetadata { name, entries }: NewMetadata) -> Result<(), LogError> {
         let record = encode(op::METADATA, &mcap::records::Metadata { name: name.clone(), metadata: entries });
         let entry = MetadataIndex { offset: self.sink.position, length: record.len() as u64, name };
         self.put(&record)?;
@@ -164,6 +167,9 @@ impl<'a> Appender<'a> {
     /// As [`Appender::write`]; [`LogError::OutputExists`] when somebody else made the output meanwhile.
     pub fn finish(mut self) -> Result<Written, LogError> {
         self.end_chunk()?;
+        for metadata in std::mem::take(&mut self.metadata) {
+            self.put_metadata(metadata)?;
+        }
         let end = DataEnd { data_section_crc: self.sink.data_crc() };
         self.put(&encode(op::DATA_END, &end))?;
         let start = self.sink.position;

@@ -214,9 +214,7 @@ impl LogError {
                 "`-o` names another output; `--in-place` adds to the log itself, where a command has it"
             }
             Self::InUse { .. } => "wait until it has ended",
-            Self::NotInPlace { .. } => {
-                "`-o` writes a new log, `--sidecar` a log of the new channels only; neither touches this one"
-            }
+            Self::NotInPlace { .. } => "`-o` writes a new log, and leaves this one as it is",
             Self::Pending { path } | Self::NotPutBack { path, .. } => {
                 let log = shell_word(&path.display().to_string());
                 return Some(format!(

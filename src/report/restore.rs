@@ -20,6 +20,8 @@ pub struct RestoreReport {
     pub additions_taken_off: usize,
     /// How many earlier ones are still in the output.
     pub additions_left: usize,
+    /// What a person must read.
+    pub warnings: Vec<String>,
 }
 
 #[cfg(test)]
