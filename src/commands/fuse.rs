@@ -9,7 +9,7 @@ use super::{CommandError, Outcome, beside, damage_of, note, say};
 use crate::cli::Fuse;
 use crate::config::Config;
 use crate::fusion::{self, Fusion};
-use crate::log::{Appender, Destination, Log, LogError, MessagesRead, NewMetadata, ReadOptions, put_back};
+use crate::log::{Appender, Destination, Log, LogError, NewMetadata, ReadOptions, bad_chunks, put_back};
 use crate::publish::{Context, Topic, messages};
 use crate::report::{self, Report};
 use crate::resolve;
@@ -46,11 +46,12 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     Appender::check(&log, &destination, &channels)?;
 
     let named = !config.source.is_empty();
-    let Recognised { unused, warnings: of_sources, bad_chunks, .. } = choose_sources(&log, &mut config)?;
+    let Recognised { unused, warnings: of_sources, mut damaged, .. } = choose_sources(&log, &mut config)?;
     warnings.extend(of_sources);
-    let Samples { mut loaded, origin, left_out, mut read } =
+    let Samples { mut loaded, origin, left_out, read } =
         source::load(&log, &config.source, named, config.output.origin)?;
-    ensure_whole(&mut read, &log, args)?;
+    damaged.extend(read.damaged);
+    ensure_whole(&mut damaged, &log, args)?;
     let known = |sentence: &String| warnings.contains(sentence);
     let left_out: Vec<String> = left_out.into_iter().filter(|sentence| !known(sentence)).collect();
     warnings.extend(left_out);
@@ -103,7 +104,7 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     };
     let metadata = metadata(&log, &config, &report)?;
     let mut appender = Appender::begin(&log, &destination, &channels, config.output.compression)?;
-    appender.leave_out(bad_chunks.into_iter().chain(read.bad_chunks()));
+    appender.leave_out(bad_chunks(&damaged));
     bar.doing("writing the track");
     for message in messages(&fusion, context, &text, &warnings) {
         appender.write(crate::log::NewMessage {
@@ -125,13 +126,13 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     Ok(if warnings.is_empty() { Outcome::Done } else { Outcome::Warned })
 }
 
-/// Refuses damage that showed when the sources were read, where only a whole log will do.
-fn ensure_whole(read: &mut MessagesRead, log: &Log, args: &Fuse) -> Result<(), LogError> {
+/// Refuses damage that showed when the sources were looked for and read, where only a whole log will do.
+fn ensure_whole(damaged: &mut Vec<LogError>, log: &Log, args: &Fuse) -> Result<(), LogError> {
     let bad = |error: &LogError| matches!(error, LogError::BadChunk { .. } | LogError::Damaged { .. });
-    let Some(first) = read.damaged.iter().position(bad).filter(|_| args.strict || args.in_place) else {
+    let Some(first) = damaged.iter().position(bad).filter(|_| args.strict || args.in_place) else {
         return Ok(());
     };
-    let error = read.damaged.swap_remove(first);
+    let error = damaged.swap_remove(first);
     if args.strict {
         return Err(error);
     }

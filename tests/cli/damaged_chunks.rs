@@ -1,9 +1,10 @@
 //! Logs of which some chunks can't be decoded.
 
 use mcap::WriteOptions;
+use serde_json::json;
 
 use super::trial::{Trial, assert_says, trackfuse};
-use super::trial_log::{Sensor, TrialLog};
+use super::trial_log::{Sensor, TrialLog, two_sensors, xyz};
 
 /// Tether and beacon in many chunks, and where those stand that got a wrong checksum: the ones that `is_bad` names by
 /// their number.
@@ -71,4 +72,32 @@ fn a_chunk_above_the_memory_limit_is_named_with_the_flag_that_raises_it() {
     let ran = trackfuse(trial.folder(), &["fuse", "in.mcap", "--memory-limit", "lots"]);
     assert_eq!(ran.code, 2, "{ran:#?}");
     assert_says(&ran.stderr, &["expected a size", "512MB"]);
+}
+
+/// A log with a chunk of its own for a channel that no source needs, but which is looked at when sources are
+/// recognised; that chunk got a wrong checksum.
+fn with_bad_bystander() -> Vec<u8> {
+    let mut log =
+        TrialLog::with(WriteOptions::new().chunk_size(Some(8_000)).calculate_data_section_crc(false));
+    let pose = json!({"position": xyz([0.0; 3]), "padding": "x".repeat(8_000)});
+    log.json("/other/pose", 0.0, &pose);
+    log.sensor("/tether/track", &Sensor::new(0.0, 8.0, 1));
+    log.sensor("/beacon/track", &Sensor::new(0.0, 8.0, 2));
+    let mut bytes = log.finish();
+    let chunk = bytes.iter().position(|byte| *byte == 6).unwrap();
+    bytes[chunk + 33] ^= 0xff;
+    bytes
+}
+
+#[test]
+fn damage_met_when_sources_are_recognised_counts_for_strict_and_in_place_too() {
+    let bytes = with_bad_bystander();
+    let trial = Trial::of(&bytes);
+    assert_eq!(trial.fuse(&[]).code, 3);
+    for way in ["--strict", "--in-place"] {
+        let ran = trackfuse(trial.folder(), &["fuse", "in.mcap", "--force", way]);
+        assert_eq!(ran.code, 1, "{ran:#?}");
+        assert_says(&ran.stderr, &["is damaged at offset", "the chunk's CRC is"]);
+    }
+    assert!(std::fs::read(trial.path("in.mcap")).unwrap() == bytes);
 }
