@@ -240,6 +240,10 @@ impl Survey<'_> {
             (Err(Closed::Unread(why)), Block::Chunk(chunk)) => {
                 self.damages.push(offset, why);
                 self.closed = true;
+                // What isn't read is given no message indexes.
+                if self.torn() == Some(offset) {
+                    self.index.torn_chunk = None;
+                }
                 if chunk.message_index_offsets.is_empty() {
                     self.hidden.get_or_insert(offset);
                 }

@@ -112,3 +112,16 @@ fn a_log_cut_off_right_behind_a_chunk_of_time_0_or_without_messages_is_indexed_o
         assert_all_found(&log, &[cut, end].concat(), what);
     }
 }
+
+#[test]
+fn a_log_cut_off_behind_a_chunk_that_cannot_be_unpacked_here_is_added_to() {
+    let (bytes, data_end) = whole();
+    for (what, last) in [("zpaq", chunk(100, b"zpaq", b"abcdef")), ("too large", chunk(1 << 44, b"", b"abc"))] {
+        let log = opened([&bytes[..data_end], &last].concat());
+        assert!(log.said().contains("it was not read"), "{what}: {}", log.said());
+        let (old, _) = log.times();
+        assert_eq!(old.len(), 12, "{what}");
+        let again = opened(fs::read(log.append()).unwrap());
+        assert_eq!(again.times().0, [&old[..], &[9]].concat(), "{what}");
+    }
+}
