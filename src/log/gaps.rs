@@ -22,8 +22,6 @@ pub(super) struct Gaps<'a> {
     pub(super) file: &'a LogFile,
     pub(super) index: &'a mut Index,
     pub(super) damages: &'a mut Damages,
-    /// Schemas and channels outside chunks, whole records.
-    pub(super) definitions: Vec<(u8, Vec<u8>)>,
     /// The first message outside chunks.
     pub(super) loose: Option<u64>,
     /// The first bytes that are no record.
@@ -85,10 +83,14 @@ impl Gaps<'_> {
                 self.add_loose(head);
             }
             op::SCHEMA | op::CHANNEL => {
-                let len = head.end() - head.offset;
-                let bytes = self.file.bytes(head.offset, len, "a schema or channel")?;
-                self.definitions.push((head.opcode, bytes));
                 self.add_loose(head);
+                // A log may repeat them any number of times: known ones aren't read again.
+                let id = self.file.bytes(head.body(), head.body_len.min(2), "a schema or channel")?;
+                if self.index.knows(head.opcode, &id) != Ok(true) {
+                    let len = head.end() - head.offset;
+                    let whole = self.file.bytes(head.offset, len, "a schema or channel")?;
+                    self.index.adopt(self.file, head.offset, head.opcode, whole)?;
+                }
             }
             op::CHUNK => {
                 let (header, _) = chunk::read_header(self.file, head.offset, head.end())?;
@@ -128,8 +130,9 @@ impl Gaps<'_> {
     }
 
     fn add_loose(&mut self, head: Head) {
+        let piece = LOOSE_PIECE.min(self.file.options.memory_limit);
         match self.index.loose.last_mut() {
-            Some(run) if run.end == head.offset && head.end() - run.start <= LOOSE_PIECE => {
+            Some(run) if run.end == head.offset && head.end() - run.start <= piece => {
                 run.end = head.end();
             }
             _ => self.index.loose.push(head.offset..head.end()),

@@ -7,7 +7,7 @@ use mcap::records::{AttachmentIndex, Channel, ChunkIndex, MetadataIndex, SchemaH
 
 use super::LogError;
 use super::chunk::CutChunk;
-use super::file::{Head, LogFile, parse};
+use super::file::{HEAD_LEN, Head, LogFile, parse};
 use super::rescue::TornChunk;
 
 /// How a channel's messages are made up.
@@ -113,6 +113,8 @@ pub struct Index {
     pub file_len: u64,
     /// The summary's records as they stand, but for summary offsets; what was missing comes behind them.
     pub(super) summary: Vec<SummaryRecord>,
+    /// How many bytes of schemas and channels the summary left out.
+    pub(super) adopted_bytes: u64,
     /// Runs of schemas, channels and messages outside chunks, in pieces of some MB.
     pub(super) loose: Vec<Range<u64>>,
     /// Of a log that is cut off within a chunk.
@@ -135,6 +137,37 @@ impl Index {
     /// Channels of a topic: several where a log was merged, or its writer restarted.
     pub fn channels_of<'a>(&'a self, topic: &'a str) -> impl Iterator<Item = &'a Channel> {
         self.channels.values().filter(move |channel| channel.topic == topic)
+    }
+
+    /// Whether there is a schema or channel with the id that `body` begins with.
+    pub(super) fn knows(&self, opcode: u8, body: &[u8]) -> Result<bool, String> {
+        let id = parse::<u16>(body)?;
+        Ok(if opcode == op::SCHEMA { self.schemas.contains_key(&id) } else { self.channels.contains_key(&id) })
+    }
+
+    /// Takes in a schema or channel that the summary leaves out, a whole record found at or in what is at `offset`.
+    ///
+    /// # Errors
+    /// [`LogError::Damaged`]; [`LogError::TooLarge`] where it takes more than the limit with those before.
+    pub(super) fn adopt(
+        &mut self,
+        file: &LogFile,
+        offset: u64,
+        opcode: u8,
+        whole: Vec<u8>,
+    ) -> Result<(), LogError> {
+        let body = whole.get(HEAD_LEN as usize..).unwrap_or_default();
+        let damaged = |problem: String| file.damaged(offset, problem);
+        if self.knows(opcode, body).map_err(damaged)? {
+            return Ok(());
+        }
+        self.adopted_bytes += whole.len() as u64;
+        if self.adopted_bytes > file.options.memory_limit {
+            return Err(file.too_large(offset, "a schema or channel, with those before it,", self.adopted_bytes));
+        }
+        self.insert(opcode, body).map_err(damaged)?;
+        self.summary.push(SummaryRecord { opcode, bytes: whole });
+        Ok(())
     }
 
     /// Puts one record of the summary into the index.

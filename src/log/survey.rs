@@ -6,15 +6,15 @@
 
 use std::collections::BTreeSet;
 
-use mcap::records::{Channel, ChunkIndex, Statistics, op};
+use mcap::records::{ChunkIndex, Statistics, op};
 
 use super::chunk::{self, Block, Scratch};
 use super::contents::{self, Closed, Contents, look_into};
 use super::damage::Damages;
 use super::extents;
-use super::file::{HEAD_LEN, LogFile, parse};
+use super::file::LogFile;
 use super::gaps::Gaps;
-use super::index::{LeftOut, Schema, SummaryRecord};
+use super::index::{LeftOut, SummaryRecord};
 use super::rescue::TornChunk;
 use super::summary::encode;
 use super::visibility::Visibility;
@@ -39,7 +39,6 @@ pub(super) fn complete(
         file,
         index,
         damages,
-        definitions: Vec::new(),
         loose: None,
         garbage: None,
         chunks: BTreeSet::new(),
@@ -50,11 +49,7 @@ pub(super) fn complete(
         position = extent.end;
     }
     gaps.walk(position..data_end)?;
-    let Gaps { definitions, loose, garbage, chunks: unnamed, .. } = gaps;
-    for (opcode, bytes) in definitions {
-        let adopted = adopt(index, opcode, &bytes);
-        adopted.unwrap_or_else(|problem| damages.push(index.data_start, problem));
-    }
+    let Gaps { loose, garbage, chunks: unnamed, .. } = gaps;
     index.chunks.sort_by_key(|chunk| chunk.chunk_start_offset);
     index.attachments.sort_by_key(|attachment| attachment.offset);
     index.metadata.sort_by_key(|metadata| metadata.offset);
@@ -123,21 +118,6 @@ fn tear(index: &mut Index) {
     }
 }
 
-/// Puts a schema or channel of the data section into the summary, if that has none with its id.
-fn adopt(index: &mut Index, opcode: u8, whole: &[u8]) -> Result<(), String> {
-    let body = whole.get(HEAD_LEN as usize..).unwrap_or_default();
-    let known = match opcode {
-        op::SCHEMA => index.schemas.contains_key(&Schema::parse(body)?.id),
-        op::CHANNEL => index.channels.contains_key(&parse::<Channel>(body)?.id),
-        _ => true,
-    };
-    if !known {
-        index.insert(opcode, body)?;
-        index.summary.push(SummaryRecord { opcode, bytes: whole.to_vec() });
-    }
-    Ok(())
-}
-
 /// Whether the summary names every schema and channel that anything in it refers to.
 fn is_complete(index: &Index) -> bool {
     let Some(statistics) = &index.statistics else { return false };
@@ -200,14 +180,18 @@ impl Survey<'_> {
 
     /// Reads every chunk for the schemas and channels that the summary leaves out, and counts.
     fn scan(&mut self) -> Result<(), LogError> {
-        let of_index = Index { summary: Vec::new(), ..self.index.clone() };
+        let Index { chunks, loose, cut_chunk, .. } = &*self.index;
+        let (chunks, loose, cut_chunk) = (chunks.clone(), loose.clone(), cut_chunk.clone());
+        let of_index = Index { chunks, loose, cut_chunk, ..Index::default() };
         let mut counted = Statistics::default();
         for block in chunk::blocks(&of_index) {
             let Some(Contents { definitions, counted: of_block }) = self.look(&block)? else { continue };
             contents::add(&mut counted, &of_block);
+            // Those outside chunks were taken in when the gaps were walked.
+            let definitions = definitions.into_iter().filter(|_| !matches!(block, Block::Loose(_)));
             for (opcode, bytes) in definitions {
-                let adopted = adopt(self.index, opcode, &bytes);
-                adopted.unwrap_or_else(|problem| self.damages.push(block.offset(), problem));
+                let adopted = self.index.adopt(self.file, block.offset(), opcode, bytes);
+                self.damages.note(adopted)?;
             }
         }
         self.count(counted);

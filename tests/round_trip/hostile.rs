@@ -209,3 +209,26 @@ fn nothing_but_damage_is_opened_and_added_to() {
 fn schema(id: u16, len: usize) -> Vec<u8> {
     record(0x03, &[&id.to_le_bytes(), &text(b"S"), &text(b"e"), &text(&vec![0; len])])
 }
+
+#[test]
+fn definitions_that_are_kept_count_together_against_the_limit_and_repeated_ones_once() {
+    let options = ReadOptions { memory_limit: 100_000, ..ReadOptions::default() };
+    let packed = |id| {
+        let schema = schema(id, 70_000);
+        chunk(schema.len() as u64, b"zstd", &zstd::encode_all(&schema[..], 3).unwrap())
+    };
+    let many = log_of(&(1..=40).map(packed).collect::<Vec<_>>());
+    assert!(many.len() < 12_000, "{}", many.len());
+    let loose = log_of(&(1..=40).map(|id| schema(id, 70_000)).collect::<Vec<_>>());
+    for bytes in [many, loose] {
+        match opened_with(bytes, options.clone()).map(|opened| opened.said()) {
+            Err(error @ LogError::TooLarge { .. }) => assert!(error.hint().is_some()),
+            other => panic!("{other:?}"),
+        }
+    }
+    let repeated = [vec![schema(1, 70_000); 40], vec![channel(1, 1, b"/a"), message(1, 1)]].concat();
+    let log = opened_with(log_of(&repeated), options.clone()).unwrap();
+    assert_eq!((log.log.index().schemas.len(), log.times()), (1, (vec![1], 0)));
+    let repeated = log_of(&vec![packed(1); 40]);
+    assert_eq!(opened_with(repeated, options).unwrap().log.index().schemas.len(), 1);
+}
