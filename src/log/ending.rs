@@ -107,7 +107,8 @@ fn read(file: &LogFile, data_start: u64, end: u64, damages: &mut Damages) -> Res
     let data_end = data_end_at(file, at, tail_start);
     // The CRC spans the summary and the footer up to the CRC itself.
     let tail_len = end - MAGIC_LEN - 4 - tail_start;
-    if data_end.is_none() && footer.summary_crc == 0 {
+    // One that is too large to be checked is no better than one without a checksum.
+    if data_end.is_none() && (footer.summary_crc == 0 || tail_len > file.options.memory_limit) {
         return Err(file.damaged(at, "expected the end of the data section before the summary"));
     }
 

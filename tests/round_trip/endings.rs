@@ -125,3 +125,23 @@ fn a_log_cut_off_behind_a_chunk_that_cannot_be_unpacked_here_is_added_to() {
         assert_eq!(again.times().0, [&old[..], &[9]].concat(), "{what}");
     }
 }
+
+#[test]
+fn a_broken_footer_is_damage_however_large_the_summary_would_be_by_it() {
+    let (mut bytes, data_end) = whole();
+    let options = ReadOptions { memory_limit: 2_000, ..ReadOptions::default() };
+    let more = chunk(0, b"", b"").repeat(60);
+    bytes.splice(data_end..data_end, more.iter().copied());
+    let len = bytes.len();
+    for at in [len - 28, len - 20] {
+        let start = u64_at(&bytes, at) + more.len() as u64;
+        bytes[at..at + 8].copy_from_slice(&start.to_le_bytes());
+    }
+    sum_up(&mut bytes);
+    let start = u64_at(&bytes, len - 28);
+    for wrong in [start, start - 2_500] {
+        bytes[len - 28..len - 20].copy_from_slice(&wrong.to_le_bytes());
+        let log = opened_with(bytes.clone(), options.clone()).unwrap_or_else(|e: LogError| panic!("{e}"));
+        assert_eq!(log.times().0.len(), 12);
+    }
+}
