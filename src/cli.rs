@@ -129,7 +129,8 @@ pub struct Fuse {
   trackfuse restore dive.mcap --in-place         takes off what `fuse --in-place` added to it
   trackfuse restore dive.mcap                    after a run was cut off: puts dive.mcap back
 
-Exit codes: 0 done; 1 failed, nothing written; 2 output exists")]
+Exit codes: 0 done; 1 failed, nothing written; 2 output exists; 3 done, with warnings that a person must
+read, such as that the original is damaged")]
 pub struct Restore {
     /// The log that was added to
     pub log: PathBuf,

@@ -28,6 +28,7 @@
 mod addition;
 mod append;
 mod by_index;
+mod checksum;
 mod chunk;
 mod contents;
 #[cfg(test)]

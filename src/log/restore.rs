@@ -3,9 +3,11 @@
 use std::io::{self, Read};
 use std::path::Path;
 
-use mcap::records::op;
+use mcap::records::{DataEnd, op};
 
+use super::checksum::crc_of_start;
 use super::file::{At, LogFile};
+use super::index::read_record;
 use super::interrupt::Writing;
 use super::new_file::{check_name, publish, readable_by_the_same, temporary_beside};
 use super::output::{check_output, copy_behind, copy_start, ensure_in_place, is_same_file};
@@ -145,15 +147,35 @@ impl Log {
         Ok(())
     }
 
-    /// Writes the original before an addition to a new file.
+    /// Whether the original's data section is as its `DataEnd` says; `None` where that says nothing.
+    fn check_data_section(&self, addition: &Addition) -> Result<Option<bool>, LogError> {
+        let end = self.file.head(addition.tail_at, addition.tail_at + addition.tail_len());
+        let Some(end) = end.ok().filter(|head| head.opcode == op::DATA_END && head.body_len >= 4) else { return Ok(None) };
+        match read_record(&self.file, end, "data end")? {
+            DataEnd { data_section_crc: 0 } => Ok(None),
+            DataEnd { data_section_crc } => {
+                Ok(Some(crc_of_start(&self.file, addition.offset)? == data_section_crc))
+            }
+        }
+    }
+
+    /// Writes the original before an addition to a new file. The answer is whether its data section is as its
+    /// checksum says, `None` where it has none; the log is read once for that.
     ///
     /// # Errors
     /// [`LogError::Damaged`] when it can't be the original; errors of [`super::write_new`].
-    pub fn restore_to(&self, addition: &Addition, out: &Path, force: bool) -> Result<(), LogError> {
+    pub fn restore_to(
+        &self,
+        addition: &Addition,
+        out: &Path,
+        force: bool,
+    ) -> Result<Option<bool>, LogError> {
         check_output(self, out, force)?;
         self.verify(addition)?;
+        let is_right = self.check_data_section(addition)?;
         let tail = self.file.reader(addition.tail_at);
-        write_original(&self.file, addition.offset, tail, addition.tail_len(), (out, force))
+        write_original(&self.file, addition.offset, tail, addition.tail_len(), (out, force))?;
+        Ok(is_right)
     }
 
     /// Makes the log, opened with [`Log::open_in_place`], the original before an addition.

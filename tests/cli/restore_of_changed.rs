@@ -71,3 +71,34 @@ fn restore_in_place_never_takes_away_what_another_program_appended() {
         assert_eq!(trackfuse(trial.folder(), &["restore", "in.mcap", "--in-place", "--last"]).code, 0);
     }
 }
+
+#[test]
+fn restore_says_what_is_damaged_and_whether_the_original_is_as_its_checksum_says() {
+    let (trial, original) = fused();
+    let ran = trackfuse(trial.folder(), &["restore", "in.mcap", "-o", "out.mcap", "--json"]);
+    assert_eq!(ran.code, 0, "{ran:#?}");
+    let report: Value = serde_json::from_str(&ran.stdout).unwrap();
+    assert_eq!(report["data_section"], "right");
+
+    // In a chunk of the original.
+    let mut log = fs::read(trial.path("in.mcap")).unwrap();
+    log[200] ^= 1;
+    fs::write(trial.path("in.mcap"), &log).unwrap();
+    let ran = trackfuse(trial.folder(), &["restore", "in.mcap", "-o", "out.mcap", "--force"]);
+    assert_eq!(ran.code, 3, "{ran:#?}");
+    assert_says(&ran.stderr, &["warning: ", "data section is not what its checksum says"]);
+    assert_says(&ran.stdout, &["warning: ", ": 1 addition taken off", "data section wrong"]);
+    assert!(!ran.stdout.contains("the original, "), "{}", ran.stdout);
+    assert_eq!(fs::read(trial.path("out.mcap")).unwrap().len(), original.len());
+    let ran = trackfuse(trial.folder(), &["restore", "in.mcap", "--in-place"]);
+    assert_says(&ran.stdout, &["data section not checked"]);
+
+    // Behind the end.
+    let (trial, original) = fused();
+    let log = [&fs::read(trial.path("in.mcap")).unwrap()[..], b"garbage"].concat();
+    fs::write(trial.path("in.mcap"), log).unwrap();
+    let ran = trackfuse(trial.folder(), &["restore", "in.mcap", "-o", "out.mcap"]);
+    assert_eq!(ran.code, 3, "{ran:#?}");
+    assert_says(&ran.stderr, &["7 bytes stand behind the log's end"]);
+    assert!(fs::read(trial.path("out.mcap")).unwrap() == original);
+}
