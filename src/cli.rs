@@ -105,7 +105,7 @@ pub struct Fuse {
     /// Replace an existing output
     #[arg(long)]
     pub force: bool,
-    /// Refuse a log that is damaged, instead of using what can be trusted
+    /// Refuse a log that is damaged, instead of using what can be trusted; reads all of it, for its checksum
     #[arg(long)]
     pub strict: bool,
     /// Prefix of the new topics [default: the config's, else /fused]
@@ -191,7 +191,7 @@ pub struct Compare {
     /// A further height to compare at, such as exit=-2, in metres, Z up [default: those on the events topic]
     #[arg(long, value_name = "NAME=Z", value_parser = height, allow_hyphen_values = true)]
     pub height: Vec<Height>,
-    /// Refuse a log that is damaged, instead of using what can be trusted
+    /// Refuse a log that is damaged, instead of using what can be trusted; reads all of it, for its checksum
     #[arg(long)]
     pub strict: bool,
     /// What the log may take.
@@ -232,7 +232,7 @@ pub struct Export {
     /// Replace an existing output
     #[arg(long)]
     pub force: bool,
-    /// Refuse a log that is damaged, instead of using what can be trusted
+    /// Refuse a log that is damaged, instead of using what can be trusted; reads all of it, for its checksum
     #[arg(long)]
     pub strict: bool,
     /// What the log may take.

@@ -162,7 +162,7 @@ fn open(path: &Path, memory: Memory, strict: bool, bar: &Bar) -> Result<(Log, Ve
 /// What is wrong with a log; refuses it where only a whole one will do.
 fn damage_of(log: &Log, strict: bool) -> Result<Vec<String>, LogError> {
     if strict {
-        log.ensure_whole()?;
+        log.ensure_as_summed_up()?;
     }
     Ok(log.damage_warnings())
 }

@@ -101,3 +101,36 @@ fn damage_met_when_sources_are_recognised_counts_for_strict_and_in_place_too() {
     }
     assert!(std::fs::read(trial.path("in.mcap")).unwrap() == bytes);
 }
+
+#[test]
+fn strict_refuses_a_data_section_whose_checksum_is_wrong_and_statistics_that_miscount() {
+    let whole = two_sensors();
+    let footer = mcap::read::footer(&whole).unwrap();
+    let mut checksum = whole.clone();
+    checksum[footer.summary_start as usize - 4] ^= 1;
+    // A message's last byte, in a chunk without a checksum: the data section's tells.
+    let mut log = TrialLog::with(WriteOptions::new().compression(None).calculate_chunk_crcs(false));
+    log.sensor("/tether/track", &Sensor::new(0.0, 8.0, 1));
+    let mut payload = log.finish();
+    let at = payload.windows(4).position(|window| window == b"\"enu").unwrap();
+    payload[at + 1] = b'f';
+    let mut log = TrialLog::with(WriteOptions::new().calculate_summary_section_crc(false));
+    log.sensor("/tether/track", &Sensor::new(0.0, 8.0, 1));
+    let mut statistics = log.finish();
+    let at = mcap::read::footer(&statistics).unwrap().summary_start as usize;
+    let at = at + statistics[at..].windows(9).position(|window| window == [0x0b, 56, 0, 0, 0, 0, 0, 0, 0]).unwrap();
+    statistics[at + 9] += 1;
+    for (bytes, says) in [
+        (checksum, "the data section's CRC is"),
+        (payload, "the data section's CRC is"),
+        (statistics, "the statistics count 162 messages, the message indexes 161"),
+    ] {
+        let trial = Trial::of(bytes);
+        let ran = trial.fuse(&["--strict"]);
+        assert_eq!(ran.code, 1, "{ran:#?}");
+        assert_says(&ran.stderr, &["is damaged at offset", says, "hint: without `--strict`"]);
+        let export = trackfuse(trial.folder(), &["export", "in.mcap", "--topic", "/tether/track", "--strict"]);
+        assert_eq!(export.code, 1, "{export:#?}");
+    }
+    assert_eq!(Trial::of(whole).fuse(&["--strict"]).code, 0);
+}
