@@ -57,7 +57,8 @@ impl Log {
                 moved = true;
                 continue;
             }
-            let tail_len = found.data_size;
+            // What the index claims may be more than there is.
+            let tail_len = found.data_size.min(found.length);
             let head = old_tail::head(data_end, tail_len);
             let stands = self.file.bytes(found.offset, head.len() as u64, "an attachment")?;
             if stands != head {
