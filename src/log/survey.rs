@@ -61,6 +61,7 @@ pub(super) fn complete(
         damages,
         unnamed,
         hidden: loose,
+        undecodable: BTreeSet::new(),
         closed: false,
         scratch: Scratch::default(),
         buf: Vec::new(),
@@ -139,6 +140,8 @@ struct Survey<'a> {
     unnamed: BTreeSet<u64>,
     /// The first part with messages that no index names.
     hidden: Option<u64>,
+    /// Chunks that can't be decoded.
+    undecodable: BTreeSet<u64>,
     /// Whether a chunk couldn't be looked into that may be whole.
     closed: bool,
     scratch: Scratch,
@@ -175,6 +178,7 @@ impl Survey<'_> {
                 self.look(&Block::Chunk(&chunk))?;
             }
         }
+        self.drop_undecodable();
         Ok(())
     }
 
@@ -194,11 +198,20 @@ impl Survey<'_> {
                 self.damages.note(adopted)?;
             }
         }
+        self.drop_undecodable();
         self.count(counted);
         Ok(())
     }
 
-    /// Looks into one part, and takes it out of the index where it can't be decoded.
+    /// Takes the chunks that can't be decoded out of the index: all at once, there may be many.
+    fn drop_undecodable(&mut self) {
+        let undecodable = std::mem::take(&mut self.undecodable);
+        self.drop_chunks(&undecodable);
+        self.index.chunks.retain(|chunk| !undecodable.contains(&chunk.chunk_start_offset));
+        self.index.undecodable += undecodable.len();
+    }
+
+    /// Looks into one part.
     fn look(&mut self, block: &Block<'_>) -> Result<Option<Contents>, LogError> {
         let looked = look_into(self.file, block, &mut self.scratch, &mut self.buf)?;
         let offset = block.offset();
@@ -215,10 +228,8 @@ impl Survey<'_> {
             (Ok(contents), _) => Ok(Some(contents)),
             (Err(Closed::Undecodable(why)), Block::Chunk(chunk)) => {
                 self.damages.push(offset, why);
-                self.index.undecodable += 1;
+                self.undecodable.insert(offset);
                 self.index.reserved_ids.extend(chunk.message_index_offsets.keys());
-                self.drop_chunks(&[offset].into());
-                self.index.chunks.retain(|chunk| chunk.chunk_start_offset != offset);
                 Ok(None)
             }
             (Err(Closed::Unread(why)), Block::Chunk(chunk)) => {

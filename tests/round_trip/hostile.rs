@@ -232,3 +232,16 @@ fn definitions_that_are_kept_count_together_against_the_limit_and_repeated_ones_
     let repeated = log_of(&vec![packed(1); 40]);
     assert_eq!(opened_with(repeated, options).unwrap().log.index().schemas.len(), 1);
 }
+
+#[test]
+fn chunks_that_cannot_be_decoded_cost_no_more_time_each_the_more_there_are() {
+    let mut bad = chunk(3, b"", b"abc");
+    // its checksum
+    bad[9 + 24] = 1;
+    let bytes = log_of(&[channel(1, 0, b"/a"), bad.repeat(60_000)]);
+    let begun = Instant::now();
+    let log = opened(bytes);
+    let took = begun.elapsed();
+    assert!(log.log.index().chunks.is_empty() && log.said().contains("the chunk's CRC"));
+    assert!(took < Duration::from_secs(4), "{took:?}");
+}
