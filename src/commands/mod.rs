@@ -153,10 +153,15 @@ impl From<Outcome> for ExitCode {
 /// Opens a command's log, and says what is wrong with it; refuses it then where only a whole one will do. `bar`
 /// shows how long work on it gets on.
 fn open(path: &Path, memory: Memory, strict: bool, bar: &Bar) -> Result<(Log, Vec<String>), LogError> {
-    let (memory_limit, observer) = (memory.memory_limit, bar.observer());
-    let log = Log::open_with(path, ReadOptions { memory_limit, observer, ..ReadOptions::default() })?;
+    let log = Log::open_with(path, options(memory, bar))?;
     let warnings = damage_of(&log, strict)?;
     Ok((log, warnings))
+}
+
+/// How a command reads its log; `bar` shows how long work on it gets on.
+fn options(memory: Memory, bar: &Bar) -> ReadOptions {
+    let (memory_limit, observer) = (memory.memory_limit, bar.observer());
+    ReadOptions { memory_limit, observer, ..ReadOptions::default() }
 }
 
 /// What is wrong with a log; refuses it where only a whole one will do.

@@ -25,7 +25,7 @@ pub(super) fn read(
     let mut need = 8 + 8 + 4;
     for next in [4_u64, 8, 0] {
         let left = head.end() - sequence.position;
-        if need > left.min(LONGEST_TEXT) {
+        if need > left.min(LONGEST_TEXT).min(sequence.file.options.memory_limit) {
             let what = format_args!("the attachment's fields need {need} bytes, its record has {left} left");
             findings.wrong(head.offset, what);
             sequence.pass(left, |_| {})?;
