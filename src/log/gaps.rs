@@ -10,7 +10,7 @@ use super::file::{HEAD_LEN, Head, LogFile};
 use super::index::{SummaryRecord, read_record};
 use super::part::MESSAGE_HEADER_LEN;
 use super::summary::encode;
-use super::{Index, LogError, chunk};
+use super::{Index, LogError, Work, chunk};
 
 /// Runs of loose records are cut into pieces of about this size, which are read at once.
 const LOOSE_PIECE: u64 = 4 << 20;
@@ -61,6 +61,7 @@ impl Gaps<'_> {
                 self.damages.note(taken)?;
             }
             position = head.end();
+            self.file.options.observer.tell(Work::Scan, position, self.index.data_end);
         }
         self.add_chunk(chunk)
     }

@@ -18,7 +18,7 @@ use super::index::{LeftOut, SummaryRecord};
 use super::rescue::TornChunk;
 use super::summary::encode;
 use super::visibility::Visibility;
-use super::{Index, LogError};
+use super::{Index, LogError, Work};
 
 /// Checks `index` against the file and adds what is missing. The answer is how readers of a successor will find
 /// the messages, and where the data section first holds bytes that are no record.
@@ -189,7 +189,10 @@ impl Survey<'_> {
         let of_index = Index { chunks, loose, cut_chunk, ..Index::default() };
         let mut counted = Statistics::default();
         for block in chunk::blocks(&of_index) {
-            let Some(Contents { definitions, counted: of_block }) = self.look(&block)? else { continue };
+            let looked = self.look(&block)?;
+            let done = block.offset().saturating_add(block.stored_size());
+            self.file.options.observer.tell(Work::Scan, done, self.index.data_end.max(done));
+            let Some(Contents { definitions, counted: of_block }) = looked else { continue };
             contents::add(&mut counted, &of_block);
             // Those outside chunks were taken in when the gaps were walked.
             let definitions = definitions.into_iter().filter(|_| !matches!(block, Block::Loose(_)));
