@@ -202,7 +202,7 @@ impl LogError {
         let hint = match self {
             Self::NotMcap { .. } => "trackfuse reads MCAP; `mcap convert` makes one of a ROS bag",
             Self::CutOff { .. } | Self::Damaged { .. } | Self::BadChunk { .. } => {
-                "`mcap recover IN -o OUT` saves what is readable (it drops private records and bad chunks)"
+                "`trackfuse inspect --verify` names all that is wrong; repair a copy, and keep this one"
             }
             Self::NotWhole { .. } => "without `--strict`, what can be trusted is used, and the rest is named",
             Self::TopicTaken { .. } => {
@@ -223,7 +223,8 @@ impl LogError {
                 ));
             }
             Self::BadUndo { .. } => {
-                "if the log beside it is whole (another copy, say), remove the file; else keep both"
+                "`trackfuse inspect --verify` on a copy of the log, elsewhere, tells whether the log is whole: then remove \
+                 the file; else keep both"
             }
             Self::NothingAdded { moved: true, .. } => {
                 "another program rewrote the log: only a log as trackfuse wrote it leads back to the original"

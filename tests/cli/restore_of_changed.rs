@@ -102,3 +102,17 @@ fn restore_says_what_is_damaged_and_whether_the_original_is_as_its_checksum_says
     assert_says(&ran.stderr, &["7 bytes stand behind the log's end"]);
     assert!(fs::read(trial.path("out.mcap")).unwrap() == original);
 }
+
+#[test]
+fn a_file_beside_the_log_that_is_none_of_ours_is_named_and_what_to_do_about_it() {
+    let trial = Trial::of(two_sensors());
+    fs::write(trial.path("in.mcap.trackfuse-undo"), "notes").unwrap();
+    for command in ["inspect", "fuse", "restore"] {
+        let ran = trackfuse(trial.folder(), &[command, "in.mcap"]);
+        assert_eq!(ran.code, 1, "{ran:#?}");
+        assert_says(
+            &ran.stderr,
+            &["in.mcap.trackfuse-undo", "it is of another kind or version", "hint: ", "`trackfuse inspect --verify` on a copy"],
+        );
+    }
+}
