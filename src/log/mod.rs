@@ -49,6 +49,7 @@ mod in_order;
 mod index;
 mod interrupt;
 mod messages;
+mod new_chunk;
 mod new_file;
 mod old_tail;
 mod open;
