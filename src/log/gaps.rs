@@ -2,12 +2,12 @@
 
 use std::{collections::BTreeSet, ops::Range};
 
-use mcap::records::{AttachmentHeader, AttachmentIndex, ChunkIndex, MetadataIndex, op};
+use mcap::records::{AttachmentHeader, ChunkIndex, MetadataIndex, op};
 
 use super::damage::Damages;
 use super::ending::may_stand_in_data;
 use super::file::{HEAD_LEN, Head, LogFile};
-use super::index::{SummaryRecord, read_record};
+use super::index::{SummaryRecord, attachment_index, read_record};
 use super::part::MESSAGE_HEADER_LEN;
 use super::summary::encode;
 use super::{Index, LogError, Work, chunk};
@@ -155,15 +155,7 @@ impl Gaps<'_> {
                 format!("an attachment claims {data_size} bytes, its record has {} in all", head.body_len);
             return Err(self.file.damaged(head.offset, what));
         }
-        let entry = AttachmentIndex {
-            offset: head.offset,
-            length: head.end() - head.offset,
-            log_time: header.log_time,
-            create_time: header.create_time,
-            data_size,
-            name: header.name,
-            media_type: header.media_type,
-        };
+        let entry = attachment_index(head, header, data_size);
         self.add(op::ATTACHMENT_INDEX, encode(op::ATTACHMENT_INDEX, &entry))
     }
 

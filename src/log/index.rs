@@ -3,7 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use mcap::records::{AttachmentIndex, Channel, ChunkIndex, MetadataIndex, SchemaHeader, Statistics, op};
+use mcap::records::{
+    AttachmentHeader, AttachmentIndex, Channel, ChunkIndex, MetadataIndex, SchemaHeader, Statistics, op,
+};
 
 use super::LogError;
 use super::chunk::CutChunk;
@@ -142,7 +144,11 @@ impl Index {
     /// Whether there is a schema or channel with the id that `body` begins with.
     pub(super) fn knows(&self, opcode: u8, body: &[u8]) -> Result<bool, String> {
         let id = parse::<u16>(body)?;
-        Ok(if opcode == op::SCHEMA { self.schemas.contains_key(&id) } else { self.channels.contains_key(&id) })
+        Ok(if opcode == op::SCHEMA {
+            self.schemas.contains_key(&id)
+        } else {
+            self.channels.contains_key(&id)
+        })
     }
 
     /// Takes in a schema or channel that the summary leaves out, a whole record found at or in what is at `offset`.
@@ -163,7 +169,11 @@ impl Index {
         }
         self.adopted_bytes += whole.len() as u64;
         if self.adopted_bytes > file.options.memory_limit {
-            return Err(file.too_large(offset, "a schema or channel, with those before it,", self.adopted_bytes));
+            return Err(file.too_large(
+                offset,
+                "a schema or channel, with those before it,",
+                self.adopted_bytes,
+            ));
         }
         self.insert(opcode, body).map_err(damaged)?;
         self.summary.push(SummaryRecord { opcode, bytes: whole });
@@ -197,4 +207,11 @@ where
     T: for<'a> binrw::BinRead<Args<'a> = ()>,
 {
     file.parse(head.offset, what, &file.bytes(head.body(), head.body_len, what)?)
+}
+
+/// What the index says of an attachment.
+pub(super) fn attachment_index(head: Head, header: AttachmentHeader, data_size: u64) -> AttachmentIndex {
+    let AttachmentHeader { log_time, create_time, name, media_type } = header;
+    let length = head.end() - head.offset;
+    AttachmentIndex { offset: head.offset, length, log_time, create_time, data_size, name, media_type }
 }

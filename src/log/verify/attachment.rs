@@ -4,6 +4,7 @@ use mcap::records::{AttachmentHeader, AttachmentIndex};
 
 use super::super::LogError;
 use super::super::file::{Head, parse};
+use super::super::index::attachment_index;
 use super::Checked;
 use super::findings::{Findings, quoted};
 use super::sequence::Sequence;
@@ -68,13 +69,5 @@ pub(super) fn read(
             format_args!("the attachment{name} has the CRC {found:08x}, its record says {claimed:08x}"),
         );
     }
-    Ok(header.map(|header| AttachmentIndex {
-        offset: head.offset,
-        length: head.end() - head.offset,
-        log_time: header.log_time,
-        create_time: header.create_time,
-        data_size,
-        name: header.name,
-        media_type: header.media_type,
-    }))
+    Ok(header.map(|header| attachment_index(head, header, data_size)))
 }
