@@ -5,7 +5,7 @@ use std::io::Read;
 use sha2::{Digest, Sha256};
 
 use super::progress::Bar;
-use super::{CommandError, Outcome, beside, damage_of, note, say};
+use super::{CommandError, Outcome, beside, checked, note, options, say};
 use crate::cli::Fuse;
 use crate::config::Config;
 use crate::fusion::{self, Fusion};
@@ -33,14 +33,9 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         note(args.voice, &format!("a run that added to {log} was cut off: {log} is as it was before that"));
     }
     let bar = Bar::new(args.voice);
-    let options = ReadOptions {
-        memory_limit: args.memory.memory_limit,
-        whole_chunks: args.check_chunks,
-        observer: bar.observer(),
-    };
+    let options = ReadOptions { whole_chunks: args.check_chunks, ..options(args.memory, &bar) };
     let open = if args.in_place { Log::open_in_place_with } else { Log::open_with };
-    let log = open(&args.log, options)?;
-    let mut warnings = damage_of(&log, args.strict)?;
+    let (log, mut warnings) = checked(open(&args.log, options)?, args.strict)?;
     let destination = destination(args);
     let channels = Topic::ALL.map(|topic| topic.channel(&config.output.prefix));
     Appender::check(&log, &destination, &channels)?;

@@ -153,9 +153,7 @@ impl From<Outcome> for ExitCode {
 /// Opens a command's log, and says what is wrong with it; refuses it then where only a whole one will do. `bar`
 /// shows how long work on it gets on.
 fn open(path: &Path, memory: Memory, strict: bool, bar: &Bar) -> Result<(Log, Vec<String>), LogError> {
-    let log = Log::open_with(path, options(memory, bar))?;
-    let warnings = damage_of(&log, strict)?;
-    Ok((log, warnings))
+    checked(Log::open_with(path, options(memory, bar))?, strict)
 }
 
 /// How a command reads its log; `bar` shows how long work on it gets on.
@@ -164,12 +162,13 @@ fn options(memory: Memory, bar: &Bar) -> ReadOptions {
     ReadOptions { memory_limit, observer, ..ReadOptions::default() }
 }
 
-/// What is wrong with a log; refuses it where only a whole one will do.
-fn damage_of(log: &Log, strict: bool) -> Result<Vec<String>, LogError> {
+/// A log with what is wrong with it; refuses it where only a whole one will do.
+fn checked(log: Log, strict: bool) -> Result<(Log, Vec<String>), LogError> {
     if strict {
         log.ensure_as_summed_up()?;
     }
-    Ok(log.damage_warnings())
+    let warnings = log.damage_warnings();
+    Ok((log, warnings))
 }
 
 /// Prints why a command wrote nothing, and what to do about it, on stderr.

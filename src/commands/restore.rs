@@ -100,5 +100,7 @@ fn text(report: &RestoreReport) -> String {
     let RestoreReport { log, output, bytes, data_section, .. } = report;
     let files = if log == output { format!("{log}, in place") } else { format!("{log} -> {output}") };
     let warnings = report.warnings.iter().map(|warning| format!("warning: {}\n", printable(warning)));
-    printable(&format!("{files}: {what}, {bytes} bytes, data section {data_section}")).into_owned() + "\n" + &warnings.collect::<String>()
+    printable(&format!("{files}: {what}, {bytes} bytes, data section {data_section}")).into_owned()
+        + "\n"
+        + &warnings.collect::<String>()
 }
