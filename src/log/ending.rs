@@ -65,6 +65,8 @@ pub(super) fn find(file: &LogFile, data_start: u64, damages: &mut Damages) -> Re
         let data_section_crc = Some(crc.data_section_crc).filter(|&crc| crc != 0);
         return Ok(Ending { data_end: head.offset, data_section_crc, distrusted: true, ..Ending::default() });
     }
+    // That a log which is cut off lacks its last bytes is no news.
+    found.found.retain(|damage| damage.offset < file.len - MAGIC_LEN);
     damages.found.append(&mut found.found);
     let cut_chunk = chunk::look_at_cut(file, walked.at)?;
     let left = file.len - walked.at;

@@ -264,7 +264,23 @@ fn the_observer_hears_of_a_scan_up_to_its_end() {
         let told = told.lock().unwrap();
         assert!(told.iter().all(|p| p.work == Work::Scan && p.done <= p.total), "{told:?}");
         assert!(told.iter().any(|p| p.done < p.total), "{told:?}");
-        let last = log.index().chunks.last().map_or(log.index().data_end, |c| c.chunk_start_offset + c.chunk_length);
+        let last =
+            log.index().chunks.last().map_or(log.index().data_end, |c| c.chunk_start_offset + c.chunk_length);
         assert_eq!(told.last().map(|p| p.done), Some(last));
+    }
+}
+
+#[test]
+fn of_a_log_that_is_cut_off_the_cut_is_named_before_what_follows_from_it() {
+    let bytes = log(chunked());
+    let whole = open(&bytes).unwrap();
+    let chunk = &whole.index().chunks[2];
+    let within = (chunk.chunk_start_offset + chunk.chunk_length) as usize - 3;
+    for (len, says) in
+        [(whole.index().data_end as usize, "the log is cut off here"), (within, "the log is cut off: of")]
+    {
+        let log = open(&bytes[..len]).unwrap();
+        assert!(log.damage()[0].what.starts_with(says), "{:?}", log.damage());
+        assert!(log.damage().iter().all(|damage| !damage.what.contains("the magic")), "{:?}", log.damage());
     }
 }
