@@ -122,7 +122,7 @@ pub struct Fuse {
     /// Replace an existing output
     #[arg(long)]
     pub force: bool,
-    /// Refuse a log that is damaged, instead of using what can be trusted
+    /// Refuse a log that is damaged, instead of using what can be trusted; reads all of it, for its checksum
     #[arg(long)]
     pub strict: bool,
     /// Prefix of the new topics [default: the config's, else /fused]
@@ -146,7 +146,8 @@ pub struct Fuse {
   trackfuse restore dive.mcap --in-place         takes off what `fuse --in-place` added to it
   trackfuse restore dive.mcap                    after a run was cut off: puts dive.mcap back
 
-Exit codes: 0 done; 1 failed, nothing written; 2 output exists")]
+Exit codes: 0 done; 1 failed, nothing written; 2 output exists; 3 done, with warnings that a person must
+read, such as that the original is damaged")]
 pub struct Restore {
     /// The log that was added to
     pub log: PathBuf,
@@ -212,7 +213,7 @@ pub struct Compare {
     /// A further height to compare at, such as exit=-2, in metres, Z up [default: those on the events topic]
     #[arg(long, value_name = "NAME=Z", value_parser = height, allow_hyphen_values = true)]
     pub height: Vec<Height>,
-    /// Refuse a log that is damaged, instead of using what can be trusted
+    /// Refuse a log that is damaged, instead of using what can be trusted; reads all of it, for its checksum
     #[arg(long)]
     pub strict: bool,
     /// What the log may take.
@@ -263,7 +264,7 @@ pub struct Export {
     /// Replace an existing output
     #[arg(long)]
     pub force: bool,
-    /// Refuse a log that is damaged, instead of using what can be trusted
+    /// Refuse a log that is damaged, instead of using what can be trusted; reads all of it, for its checksum
     #[arg(long)]
     pub strict: bool,
     /// What the log may take.

@@ -24,6 +24,7 @@ mod cli {
     mod real_logs;
     mod report;
     mod restore;
+    mod restore_of_changed;
     mod sources;
     mod trial;
     mod trial_log;

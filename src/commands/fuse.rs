@@ -5,11 +5,11 @@ use std::io::Read;
 use sha2::{Digest, Sha256};
 
 use super::progress::Bar;
-use super::{CommandError, Outcome, beside, damage_of, html_report, note, say};
+use super::{CommandError, Outcome, beside, checked, html_report, note, options, say};
 use crate::cli::Fuse;
 use crate::config::Config;
 use crate::fusion::{self, Fusion};
-use crate::log::{Appender, Destination, Log, LogError, MessagesRead, NewMetadata, ReadOptions, put_back};
+use crate::log::{Appender, Destination, Log, LogError, NewMetadata, ReadOptions, bad_chunks, put_back};
 use crate::publish::{Context, Topic, messages};
 use crate::report::{self, Report, html};
 use crate::resolve;
@@ -33,25 +33,21 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         note(args.voice, &format!("a run that added to {log} was cut off: {log} is as it was before that"));
     }
     let bar = Bar::new(args.voice);
-    let options = ReadOptions {
-        memory_limit: args.memory.memory_limit,
-        whole_chunks: args.check_chunks,
-        observer: bar.observer(),
-    };
+    let options = ReadOptions { whole_chunks: args.check_chunks, ..options(args.memory, &bar) };
     let open = if args.in_place { Log::open_in_place_with } else { Log::open_with };
-    let log = open(&args.log, options)?;
-    let mut warnings = damage_of(&log, args.strict)?;
+    let (log, mut warnings) = checked(open(&args.log, options)?, args.strict)?;
     let destination = destination(args);
     let channels = Topic::ALL.map(|topic| topic.channel(&config.output.prefix));
     Appender::check(&log, &destination, &channels)?;
     html_report::check(args, &log, &destination)?;
 
     let named = !config.source.is_empty();
-    let Recognised { unused, warnings: of_sources, bad_chunks, .. } = choose_sources(&log, &mut config)?;
+    let Recognised { unused, warnings: of_sources, mut damaged, .. } = choose_sources(&log, &mut config)?;
     warnings.extend(of_sources);
-    let Samples { mut loaded, origin, left_out, mut read } =
+    let Samples { mut loaded, origin, left_out, read } =
         source::load(&log, &config.source, named, config.output.origin)?;
-    ensure_whole(&mut read, &log, args)?;
+    damaged.extend(read.damaged);
+    ensure_whole(&mut damaged, &log, args)?;
     let known = |sentence: &String| warnings.contains(sentence);
     let left_out: Vec<String> = left_out.into_iter().filter(|sentence| !known(sentence)).collect();
     warnings.extend(left_out);
@@ -106,7 +102,7 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     let parts = html::fusion::Parts { report: &report, fusion: &fusion, sources: &sources, origin, t0 };
     let page = html_report::prepare(args, parts, &metadata)?;
     let mut appender = Appender::begin(&log, &destination, &channels, config.output.compression)?;
-    appender.leave_out(bad_chunks.into_iter().chain(read.bad_chunks()));
+    appender.leave_out(bad_chunks(&damaged));
     bar.doing("writing the track");
     for message in messages(&fusion, context, &text, &warnings) {
         appender.write(crate::log::NewMessage {
@@ -115,7 +111,7 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
             data: &message.data,
         })?;
     }
-    appender.write_metadata(&metadata)?;
+    appender.add_metadata(metadata);
     appender.finish()?;
     html_report::publish(page, &output_name)?;
     drop(bar);
@@ -130,13 +126,13 @@ fn files(args: &Fuse, input: &str, output: &str) -> String {
     args.report.as_ref().map_or(log.clone(), |page| format!("{log}, {}", page.display()))
 }
 
-/// Refuses damage that showed when the sources were read, where only a whole log will do.
-fn ensure_whole(read: &mut MessagesRead, log: &Log, args: &Fuse) -> Result<(), LogError> {
+/// Refuses damage that showed when the sources were looked for and read, where only a whole log will do.
+fn ensure_whole(damaged: &mut Vec<LogError>, log: &Log, args: &Fuse) -> Result<(), LogError> {
     let bad = |error: &LogError| matches!(error, LogError::BadChunk { .. } | LogError::Damaged { .. });
-    let Some(first) = read.damaged.iter().position(bad).filter(|_| args.strict || args.in_place) else {
+    let Some(first) = damaged.iter().position(bad).filter(|_| args.strict || args.in_place) else {
         return Ok(());
     };
-    let error = read.damaged.swap_remove(first);
+    let error = damaged.swap_remove(first);
     if args.strict {
         return Err(error);
     }

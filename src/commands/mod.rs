@@ -150,7 +150,11 @@ impl CommandError {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         let usage = match self {
-            Self::Config(_) | Self::Resolve(_) | Self::OneName { .. } | Self::Export(_) | Self::File { .. } => true,
+            Self::Config(_)
+            | Self::Resolve(_)
+            | Self::OneName { .. }
+            | Self::Export(_)
+            | Self::File { .. } => true,
             Self::Source(SourceError::Log(error)) | Self::Log(error) => is_usage(error),
             Self::Source(error) => error.is_usage(),
             Self::Simulate(error) => is_of_scenario(error),
@@ -188,18 +192,22 @@ impl From<Outcome> for ExitCode {
 /// Opens a command's log, and says what is wrong with it; refuses it then where only a whole one will do. `bar`
 /// shows how long work on it gets on.
 fn open(path: &Path, memory: Memory, strict: bool, bar: &Bar) -> Result<(Log, Vec<String>), LogError> {
-    let (memory_limit, observer) = (memory.memory_limit, bar.observer());
-    let log = Log::open_with(path, ReadOptions { memory_limit, observer, ..ReadOptions::default() })?;
-    let warnings = damage_of(&log, strict)?;
-    Ok((log, warnings))
+    checked(Log::open_with(path, options(memory, bar))?, strict)
 }
 
-/// What is wrong with a log; refuses it where only a whole one will do.
-fn damage_of(log: &Log, strict: bool) -> Result<Vec<String>, LogError> {
+/// How a command reads its log; `bar` shows how long work on it gets on.
+fn options(memory: Memory, bar: &Bar) -> ReadOptions {
+    let (memory_limit, observer) = (memory.memory_limit, bar.observer());
+    ReadOptions { memory_limit, observer, ..ReadOptions::default() }
+}
+
+/// A log with what is wrong with it; refuses it where only a whole one will do.
+fn checked(log: Log, strict: bool) -> Result<(Log, Vec<String>), LogError> {
     if strict {
-        log.ensure_whole()?;
+        log.ensure_as_summed_up()?;
     }
-    Ok(log.damage_warnings())
+    let warnings = log.damage_warnings();
+    Ok((log, warnings))
 }
 
 /// Prints why a command wrote nothing, and what to do about it, on stderr.

@@ -211,7 +211,7 @@ impl LogError {
             Self::NotMcap { .. } => "trackfuse reads MCAP; `mcap convert` makes one of a ROS bag",
             Self::Write { path, source } => return write_hint(path, source),
             Self::CutOff { .. } | Self::Damaged { .. } | Self::BadChunk { .. } => {
-                "`mcap recover IN -o OUT` saves what is readable (it drops private records and bad chunks)"
+                "`trackfuse inspect --verify` names all that is wrong; repair a copy, and keep this one"
             }
             Self::NotWhole { .. } => "without `--strict`, what can be trusted is used, and the rest is named",
             Self::TopicTaken { .. } => {
@@ -223,9 +223,7 @@ impl LogError {
                 "`-o` names another output; `--in-place` adds to the log itself, where a command has it"
             }
             Self::InUse { .. } => "wait until it has ended",
-            Self::NotInPlace { .. } => {
-                "`-o` writes a new log, `--sidecar` a log of the new channels only; neither touches this one"
-            }
+            Self::NotInPlace { .. } => "`-o` writes a new log, and leaves this one as it is",
             Self::Pending { path } | Self::NotPutBack { path, .. } => {
                 let log = shell_word(&path.display().to_string());
                 return Some(format!(
@@ -234,7 +232,8 @@ impl LogError {
                 ));
             }
             Self::BadUndo { .. } => {
-                "if the log beside it is whole (another copy, say), remove the file; else keep both"
+                "`trackfuse inspect --verify` on a copy of the log, elsewhere, tells whether the log is whole: then remove \
+                 the file; else keep both"
             }
             Self::NothingAdded { moved: true, .. } => {
                 "another program rewrote the log: only a log as trackfuse wrote it leads back to the original"

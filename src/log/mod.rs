@@ -28,6 +28,7 @@
 mod addition;
 mod append;
 mod by_index;
+mod checksum;
 mod chunk;
 mod contents;
 #[cfg(test)]
@@ -49,6 +50,7 @@ mod index;
 mod interrupt;
 mod messages;
 mod nearby;
+mod new_chunk;
 mod new_file;
 mod old_tail;
 mod open;

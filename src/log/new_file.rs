@@ -83,6 +83,7 @@ impl Prepared {
 pub(super) fn publish(file: NamedTempFile, out: &Path, force: bool) -> Result<(), LogError> {
     let written = |source| LogError::Write { path: out.to_owned(), source };
     disk::sync(file.as_file()).map_err(written)?;
+    let _held = if force { hold(out)? } else { None };
     disk::take(Step::Rename).map_err(written)?;
     let named = if force { file.persist(out) } else { file.persist_noclobber(out) };
     match named {
@@ -95,6 +96,18 @@ pub(super) fn publish(file: NamedTempFile, out: &Path, force: bool) -> Result<()
     // the file is there and whole: that its name is on the disk too is wished for, and not always granted
     let _ = disk::sync_folder(out);
     Ok(())
+}
+
+/// The file that is about to be replaced, held so that no run begins to change it in place meanwhile: its work
+/// would be lost with it.
+fn hold(out: &Path) -> Result<Option<File>, LogError> {
+    let is_file = fs::symlink_metadata(out).is_ok_and(|found| found.is_file());
+    let Some(file) = is_file.then(|| File::open(out).ok()).flatten() else { return Ok(None) };
+    if let Err(TryLockError::WouldBlock) = file.try_lock_shared() {
+        return Err(LogError::InUse { path: out.to_owned() });
+    }
+    undo::refuse_pending(out)?;
+    Ok(Some(file))
 }
 
 /// The input's permissions, writable by its owner: a private recording's successor is private too.

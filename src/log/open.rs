@@ -1,6 +1,10 @@
 //! A log, open for reading: whatever of it can be trusted, and what is wrong with the rest.
 
-use std::{collections::BTreeMap, io::Read, path::Path};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    io::Read,
+    path::Path,
+};
 
 use mcap::records::{Header, MetadataIndex, op};
 
@@ -97,8 +101,10 @@ impl Log {
             (visibility, _) = survey::complete(&file, &mut index, &mut damages)?;
         }
         let mut damage = damages.found;
-        damage.sort();
-        damage.dedup();
+        // Of one place the cause stands first, as it was found first.
+        damage.sort_by_key(|damage| damage.offset);
+        let mut said = BTreeSet::new();
+        damage.retain(|damage| said.insert(damage.clone()));
         Ok(Self { file, index, visibility, damage })
     }
 

@@ -139,7 +139,11 @@ impl<'a> Sink<'a> {
                 None => Ok(()),
             },
             Kind::InPlace { log, undo, is_original } => {
-                let done = disk::sync(&log.file).and_then(|()| undo.remove());
+                let named = || match log.has_its_name() {
+                    true => Ok(()),
+                    false => Err(io::Error::other("another file took its name meanwhile")),
+                };
+                let done = disk::sync(&log.file).and_then(|()| named()).and_then(|()| undo.remove());
                 // then there is nothing left to put back
                 *is_original = done.is_ok();
                 done.map_err(|e| self.failed(e))
@@ -262,6 +266,9 @@ pub(super) fn ensure_in_place(log: &Log) -> Result<(), LogError> {
     }
     if let Some(damage) = log.damage().first() {
         return refuse(&format!("it is damaged at offset {}: {}", damage.offset, damage.what));
+    }
+    if !log.file.has_its_name() {
+        return refuse("another file took its name meanwhile");
     }
     if !log.has_its_length() {
         return refuse("somebody else changed it meanwhile");
