@@ -7,7 +7,9 @@ use std::path::Path;
 use tempfile::TempDir;
 use trackfuse::inspect::inspect;
 use trackfuse::log::verify::verify as verify_file;
-use trackfuse::log::{Appender, Compression, Destination, Log, LogError, NewChannel, NewMessage, ReadOptions};
+use trackfuse::log::{
+    Appender, Compression, Destination, Log, LogError, NewChannel, NewMessage, ReadOptions,
+};
 
 thread_local! {
     static FOLDER: TempDir = tempfile::tempdir().expect("a temporary folder");

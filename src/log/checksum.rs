@@ -13,8 +13,11 @@ impl Log {
     pub fn ensure_as_summed_up(&self) -> Result<(), LogError> {
         self.ensure_whole()?;
         let index = self.index();
-        let wrong =
-            |offset, what| LogError::NotWhole { path: self.path().to_owned(), first: Damage { offset, what }, more: 0 };
+        let wrong = |offset, what| LogError::NotWhole {
+            path: self.path().to_owned(),
+            first: Damage { offset, what },
+            more: 0,
+        };
         if let Some(what) = self.miscounted_messages() {
             return Err(wrong(index.summary_start.unwrap_or(index.data_end), what));
         }

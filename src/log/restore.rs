@@ -95,7 +95,8 @@ impl Log {
         let attachments = index.attachments.iter().map(|a| (a.offset, &a.name));
         let named = attachments.chain(index.metadata.iter().map(|m| (m.offset, &m.name)));
         let others = named.filter(|(at, name)| within.contains(at) && !name.starts_with(METADATA));
-        let ours = index.metadata.iter().rfind(|m| within.contains(&m.offset) && m.name.starts_with(METADATA));
+        let ours =
+            index.metadata.iter().rfind(|m| within.contains(&m.offset) && m.name.starts_with(METADATA));
         let end = ours.map(|m| m.offset.saturating_add(m.length)).filter(|&end| end < addition.end);
         others.map(|(at, _)| at).chain(end).min()
     }
@@ -151,7 +152,9 @@ impl Log {
     /// Whether the original's data section is as its `DataEnd` says; `None` where that says nothing.
     fn check_data_section(&self, addition: &Addition) -> Result<Option<bool>, LogError> {
         let end = self.file.head(addition.tail_at, addition.tail_at + addition.tail_len());
-        let Some(end) = end.ok().filter(|head| head.opcode == op::DATA_END && head.body_len >= 4) else { return Ok(None) };
+        let Some(end) = end.ok().filter(|head| head.opcode == op::DATA_END && head.body_len >= 4) else {
+            return Ok(None);
+        };
         match read_record(&self.file, end, "data end")? {
             DataEnd { data_section_crc: 0 } => Ok(None),
             DataEnd { data_section_crc } => {
@@ -165,12 +168,7 @@ impl Log {
     ///
     /// # Errors
     /// [`LogError::Damaged`] when it can't be the original; errors of [`super::write_new`].
-    pub fn restore_to(
-        &self,
-        addition: &Addition,
-        out: &Path,
-        force: bool,
-    ) -> Result<Option<bool>, LogError> {
+    pub fn restore_to(&self, addition: &Addition, out: &Path, force: bool) -> Result<Option<bool>, LogError> {
         check_output(self, out, force)?;
         self.verify(addition)?;
         let is_right = self.check_data_section(addition)?;

@@ -35,14 +35,7 @@ pub(super) fn complete(
     let read_by_index = !index.chunks.is_empty() && !index.channels.is_empty();
 
     let data_end = index.data_end;
-    let mut gaps = Gaps {
-        file,
-        index,
-        damages,
-        loose: None,
-        garbage: None,
-        chunks: BTreeSet::new(),
-    };
+    let mut gaps = Gaps { file, index, damages, loose: None, garbage: None, chunks: BTreeSet::new() };
     let mut position = gaps.index.data_start;
     for extent in known {
         gaps.walk(position..extent.start)?;

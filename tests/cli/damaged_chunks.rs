@@ -118,7 +118,8 @@ fn strict_refuses_a_data_section_whose_checksum_is_wrong_and_statistics_that_mis
     log.sensor("/tether/track", &Sensor::new(0.0, 8.0, 1));
     let mut statistics = log.finish();
     let at = mcap::read::footer(&statistics).unwrap().summary_start as usize;
-    let at = at + statistics[at..].windows(9).position(|window| window == [0x0b, 56, 0, 0, 0, 0, 0, 0, 0]).unwrap();
+    let at = at
+        + statistics[at..].windows(9).position(|window| window == [0x0b, 56, 0, 0, 0, 0, 0, 0, 0]).unwrap();
     statistics[at + 9] += 1;
     for (bytes, says) in [
         (checksum, "the data section's CRC is"),
@@ -129,7 +130,8 @@ fn strict_refuses_a_data_section_whose_checksum_is_wrong_and_statistics_that_mis
         let ran = trial.fuse(&["--strict"]);
         assert_eq!(ran.code, 1, "{ran:#?}");
         assert_says(&ran.stderr, &["is damaged at offset", says, "hint: without `--strict`"]);
-        let export = trackfuse(trial.folder(), &["export", "in.mcap", "--topic", "/tether/track", "--strict"]);
+        let export =
+            trackfuse(trial.folder(), &["export", "in.mcap", "--topic", "/tether/track", "--strict"]);
         assert_eq!(export.code, 1, "{export:#?}");
     }
     assert_eq!(Trial::of(whole).fuse(&["--strict"]).code, 0);

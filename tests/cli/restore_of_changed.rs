@@ -31,14 +31,22 @@ fn amend(trial: &Trial, opcode: u8, body: &[u8]) {
 
 fn attachment() -> Vec<u8> {
     let text = |text: &str| [&(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat();
-    let mut body = [&[0; 16][..], &text("dive.pdf"), &text("application/pdf"), &4_u64.to_le_bytes(), b"%PDF"].concat();
+    let mut body =
+        [&[0; 16][..], &text("dive.pdf"), &text("application/pdf"), &4_u64.to_le_bytes(), b"%PDF"].concat();
     body.extend(crc32fast::hash(&body).to_le_bytes());
     body
 }
 
 /// A channel in a chunk.
 fn chunk() -> Vec<u8> {
-    let records = [&[0x04, 26, 0, 0, 0, 0, 0, 0, 0, 99, 0, 0, 0, 6, 0, 0, 0][..], b"/other", &[4, 0, 0, 0], b"json", &[0; 4]].concat();
+    let records = [
+        &[0x04, 26, 0, 0, 0, 0, 0, 0, 0, 99, 0, 0, 0, 6, 0, 0, 0][..],
+        b"/other",
+        &[4, 0, 0, 0],
+        b"json",
+        &[0; 4],
+    ]
+    .concat();
     let len = (records.len() as u64).to_le_bytes();
     [&[0; 16][..], &len, &[0; 4], &[0; 4], &len, &records].concat()
 }
@@ -60,7 +68,8 @@ fn restore_in_place_never_takes_away_what_another_program_appended() {
             assert!(!refused.stderr.contains("--sidecar"), "{refused:#?}");
             assert!(fs::read(trial.path("in.mcap")).unwrap() == before);
 
-            let ran = trackfuse(trial.folder(), &["restore", "in.mcap", "-o", "out.mcap", "--force", "--json"]);
+            let ran =
+                trackfuse(trial.folder(), &["restore", "in.mcap", "-o", "out.mcap", "--force", "--json"]);
             assert_eq!(ran.code, 3, "{ran:#?}");
             assert_says(&ran.stderr, &["warning: ", "another program appended"]);
             let report: Value = serde_json::from_str(&ran.stdout).unwrap();
@@ -112,7 +121,12 @@ fn a_file_beside_the_log_that_is_none_of_ours_is_named_and_what_to_do_about_it()
         assert_eq!(ran.code, 1, "{ran:#?}");
         assert_says(
             &ran.stderr,
-            &["in.mcap.trackfuse-undo", "it is of another kind or version", "hint: ", "`trackfuse inspect --verify` on a copy"],
+            &[
+                "in.mcap.trackfuse-undo",
+                "it is of another kind or version",
+                "hint: ",
+                "`trackfuse inspect --verify` on a copy",
+            ],
         );
     }
 }

@@ -116,7 +116,8 @@ fn a_log_cut_off_right_behind_a_chunk_of_time_0_or_without_messages_is_indexed_o
 #[test]
 fn a_log_cut_off_behind_a_chunk_that_cannot_be_unpacked_here_is_added_to() {
     let (bytes, data_end) = whole();
-    for (what, last) in [("zpaq", chunk(100, b"zpaq", b"abcdef")), ("too large", chunk(1 << 44, b"", b"abc"))] {
+    for (what, last) in [("zpaq", chunk(100, b"zpaq", b"abcdef")), ("too large", chunk(1 << 44, b"", b"abc"))]
+    {
         let log = opened([&bytes[..data_end], &last].concat());
         assert!(log.said().contains("it was not read"), "{what}: {}", log.said());
         let (old, _) = log.times();

@@ -3,8 +3,8 @@
 use std::fs;
 use std::sync::{Arc, Mutex};
 
-use super::super::fixture::{PRIVATE, chunked, log, on_disk, records};
 use super::super::Observer;
+use super::super::fixture::{PRIVATE, chunked, log, on_disk, records};
 use super::super::summary::encode_bytes;
 use super::*;
 use mcap::records::op;
