@@ -139,10 +139,8 @@ impl<'a> Sink<'a> {
                 None => Ok(()),
             },
             Kind::InPlace { log, undo, is_original } => {
-                let named = || match log.has_its_name() {
-                    true => Ok(()),
-                    false => Err(io::Error::other("another file took its name meanwhile")),
-                };
+                let lost = || io::Error::other("another file took its name meanwhile");
+                let named = || log.has_its_name().then_some(()).ok_or_else(lost);
                 let done = disk::sync(&log.file).and_then(|()| named()).and_then(|()| undo.remove());
                 // then there is nothing left to put back
                 *is_original = done.is_ok();
