@@ -10,7 +10,7 @@ use std::process::Command;
 const HOSTILE: &str = "</script><img src=x onerror=document.documentElement.dataset.ran=1>";
 
 fn browser() -> Option<PathBuf> {
-    let found = std::env::var_os("TRACKFUSE_TEST_BROWSER").map(PathBuf::from);
+    let found = std::env::var_os("TRACKFUSE_TEST_BROWSER").filter(|path| !path.is_empty()).map(PathBuf::from);
     if found.is_none() {
         // past the test runner, which would keep it to itself
         let said = b"skipped: TRACKFUSE_TEST_BROWSER is not set\n";
