@@ -102,7 +102,8 @@ pub(super) fn warn(
             Mirrored::Vertical => "with z turned over",
         };
         warnings.push(format!(
-            "the positions of {} are mirrored against the datum's, which no rotation mends; they would fit far better {what}",
+            "{} is left out: its positions are mirrored against the datum's, which no rotation mends; they would fit far \
+             better {what}",
             source.name
         ));
     }

@@ -34,6 +34,11 @@ fn pose(position: [f64; 3], [x, y, z]: [f64; 3], angle_rad: f64) -> Value {
     json!({"pose": {"position": xyz(position), "orientation": orientation}})
 }
 
+fn assert_near_by(output: &Output, t: f64, expected: [f64; 3]) {
+    let found = output.near(t).vector("position");
+    assert!((0..3).all(|i| (found[i] - expected[i]).abs() < 0.1), "at {t} s: {found:?}, {expected:?}");
+}
+
 fn assert_near(output: &Output, field: &str, t: f64, expected: [f64; 3]) {
     let found = output.near(t).vector(field);
     assert!(
@@ -111,6 +116,35 @@ fn axes_of_north_east_down_hold_for_attitude_lever_arm_and_body_velocity_too() {
         assert_near(&output, "position", t, [3.0 * t + 2.0, 7.0 - 1.0, -10.0 + 0.5 * t - 0.25]);
         assert_near(&output, "velocity", t, [3.0, 0.0, 0.5]);
     }
+}
+
+#[test]
+fn axes_that_are_mislabelled_cost_their_source_its_place_with_the_reason() {
+    let mut log = TrialLog::new();
+    for k in 0..=160 {
+        let t = 0.05 * f64::from(k);
+        let [x, y, z] = [6.0 * t.sin(), 9.0 * (0.6 * t).cos() + t, -50.0 + 4.0 * t];
+        let noise = |i: i32| 0.05 * f64::from(k * k * 7 + i * 31).sin();
+        let message = |v: [f64; 3]| {
+            let v = xyz([0, 1, 2].map(|i| v[i] + noise(i as i32)));
+            json!({"timestamp": stamp(ns(t)), "position": v})
+        };
+        log.json("/tether/track", t, &message([x, y, z]));
+        log.json("/beacon/track", t, &message([y, x, -z]));
+    }
+    let log = log.finish();
+    let (report, output) = Trial::of(&log).report(3);
+    assert_says(
+        &report["warnings"].to_string(),
+        &["beacon is left out: its positions are mirrored", "say `axes = \\\"ned\\\"` for this source"],
+    );
+    let [x, y, z] = [6.0 * 4.0_f64.sin(), 9.0 * 2.4_f64.cos() + 4.0, -34.0];
+    assert_near_by(&output, 4.0, [x, y, z]);
+    let config = "[[source]]\nname = \"tether\"\nposition = \"/tether/track.position\"\n[[source]]\nname = \"beacon\"\n\
+                  position = \"/beacon/track.position\"\naxes = \"ned\"\n";
+    let (report, output) = Trial::of(&log).config(config).report(0);
+    assert_eq!(report["warnings"], json!([]));
+    assert_near_by(&output, 4.0, [x, y, z]);
 }
 
 #[test]

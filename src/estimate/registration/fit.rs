@@ -216,7 +216,7 @@ impl<'a> Fit<'a> {
                     Kind::ClockOffset | Kind::Scale => self.posterior.is_some(),
                     Kind::Rotation => self.frames[source].is_some() && self.posterior.is_some(),
                 };
-                if acts && self.settings.kinds.contains(&kind) {
+                if acts && measures.contains(&true) && self.settings.kinds.contains(&kind) {
                     active.push(index(slot, kind, axis));
                 }
             }

@@ -64,6 +64,8 @@ pub use rotation::Mirrored;
 pub use separation::{Name, Separation, Unknown};
 pub use unknowns::{Kind, Priors, SourceErrors};
 
+use std::borrow::Cow;
+
 use fit::Fit;
 use start::Guess;
 
@@ -133,7 +135,7 @@ pub struct Registered {
     pub noise: Vec<[Level; 2]>,
     /// Samples that are no noise, in order of source, quantity and time.
     pub rejected: Vec<Rejected>,
-    /// Sources whose axes are no rotation of the datum's: they are not registered.
+    /// Sources whose axes are no rotation of the datum's: they are left out.
     pub mirrored: Vec<Option<Mirrored>>,
     /// Number of knots.
     pub knots: usize,
@@ -193,7 +195,11 @@ pub fn register(
     for source in others() {
         let late = (source, guesses[source].clock_offset_s);
         mirrored[source] = rotation::mirrored(sources, datum, late, &coverage);
-        if mirrored[source].is_some() || !settings.kinds.contains(&Kind::Rotation) {
+        if mirrored[source].is_some() {
+            guesses[source] = Guess::default();
+            continue;
+        }
+        if !settings.kinds.contains(&Kind::Rotation) {
             continue;
         }
         let found = rotation::candidates(sources, datum, late, &coverage, &settings.priors);
@@ -202,7 +208,11 @@ pub fn register(
             None => frames.extend(found.into_iter().map(|frame| (source, frame))),
         }
     }
-    let run = |guesses: &[Guess]| Fit::run(sources, datum, pieces, guesses, settings);
+    let mut kept = Cow::Borrowed(sources);
+    for source in others().filter(|&source| mirrored[source].is_some()) {
+        kept.to_mut()[source] = Source { name: sources[source].name.clone(), ..Source::default() };
+    }
+    let run = |guesses: &[Guess]| Fit::run(&kept, datum, pieces, guesses, settings);
     let mut best = run(&guesses);
     for (source, frame) in frames {
         let mut turned = guesses.clone();

@@ -148,29 +148,36 @@ pub(super) fn candidates(
     angles.into_iter().map(|angle_rad| Frame::of(&places, angle_rad)).collect()
 }
 
-/// Whether the axes of `source` are mirrored against the datum's: its positions, whose stamps are late by about
-/// `offset_s`, then fit far better than by any angle.
+/// Whether the axes of `source` are mirrored against the datum's: its positions then fit far better than by any angle,
+/// with stamps that are late by about `offset_s` or not at all: a height that counts the other way feigns an offset.
 pub(super) fn mirrored(
     sources: &[Source],
     datum: usize,
     (source, offset_s): (usize, f64),
     coverage: &Coverage,
 ) -> Option<Mirrored> {
-    let quantity = Quantity::Position;
-    let (from, to) = (sources[datum].series(quantity), sources[source].series(quantity));
-    let mut pairs = pairs(from, to, offset_s, coverage.outage_s(datum, quantity));
-    if pairs.len() < MIN_PAIRS {
-        return None;
+    let (from, to) = (&sources[datum].positions, &sources[source].positions);
+    let max_gap_s = coverage.outage_s(datum, Quantity::Position);
+    // of the level and the height, what is left as they are, and mirrored
+    let (mut level, mut vertical) = ([f64::INFINITY; 2], [f64::INFINITY; 2]);
+    for offset_s in [0.0, offset_s] {
+        let mut pairs = pairs(from, to, offset_s, max_gap_s);
+        if pairs.len() < MIN_PAIRS {
+            continue;
+        }
+        centre(&mut pairs);
+        let swapped: Vec<Pair> =
+            pairs.iter().map(|p| Pair { source: [p.source[1], p.source[0], p.source[2]], ..*p }).collect();
+        for (i, (pairs, sign)) in [(&pairs, 1.0), (&swapped, -1.0)].into_iter().enumerate() {
+            let height = |p: &Pair| (p.source[2] - sign * p.datum[2]).abs();
+            let left = turn(pairs, 0.0, |_| 0.0).map(|turn| turn.left_m);
+            level[i] = level[i].min(left.unwrap_or(f64::INFINITY));
+            let left = robust::median(&mut pairs.iter().map(height).collect::<Vec<_>>());
+            vertical[i] = vertical[i].min(left.unwrap_or(f64::INFINITY));
+        }
     }
-    centre(&mut pairs);
-    let swapped = pairs.iter().map(|p| Pair { source: [p.source[1], p.source[0], p.source[2]], ..*p });
-    let left = |pairs: &[Pair]| turn(pairs, 0.0, |_| 0.0).map(|t| t.left_m);
-    let level = left(&swapped.collect::<Vec<_>>())? < MIRRORED * left(&pairs)?;
-    let apart = |sign: f64| {
-        robust::median(&mut pairs.iter().map(|p| (p.source[2] - sign * p.datum[2]).abs()).collect::<Vec<_>>())
-    };
-    let vertical = apart(-1.0)? < MIRRORED * apart(1.0)?;
-    match (level, vertical) {
+    let is_mirrored = |[plain, mirrored]: [f64; 2]| mirrored < MIRRORED * plain && plain.is_finite();
+    match (is_mirrored(level), is_mirrored(vertical)) {
         (true, true) => Some(Mirrored::Ned),
         (true, false) => Some(Mirrored::Level),
         (false, true) => Some(Mirrored::Vertical),
