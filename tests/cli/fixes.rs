@@ -136,6 +136,7 @@ fn fixes_and_odometry_of_a_real_robot_are_chosen_on_the_command_line_and_never_f
 
 /// By `tests/geodesy_golden.py`: 13 fixes, 0.5 s apart, of what moves by (4, 3, -2) m/s from (100, -50, 0) m east, north
 /// and up of the origin.
+#[expect(clippy::unreadable_literal, reason = "as the script prints them")]
 const MOVING: [[f64; 3]; 13] = [
     [59.39955116347169, 10.501760313652504, 3.0009778175208672],
     [59.3995646276642, 10.501795520918572, 2.0009978360003853],
