@@ -329,13 +329,16 @@ pub struct Inspect {
 #[command(after_help = "Examples:
   trackfuse init dive.mcap -o dive.toml && trackfuse fuse dive.mcap --config dive.toml
   trackfuse init dive.mcap --source /gps/fix --source /odometry -o dive.toml    the datum first
+  trackfuse init dive.mcap --source /gps/fix,/dvl/twist -o dive.toml            one source of two topics
 
 Exit codes: 0 done; 1 failed, nothing written; 2 output exists; 3 done, with warnings that a person
 must read, such as that the config names no source until one is chosen in it")]
 pub struct Init {
     /// The log to write a config for
     pub log: PathBuf,
-    /// A topic to take as a source, the datum's first [default: what the topics' names tell]
+    /// A topic to take as a source, the datum's first; two with a comma between them for a position and a velocity
+    /// that are of one source, as topics are whose names say so, such as /gps/pose and /gps/twist [default: what the
+    /// topics' names tell]
     #[arg(long, value_name = "TOPIC")]
     pub source: Vec<String>,
     /// The config to write [default: stdout]

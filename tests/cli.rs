@@ -9,6 +9,7 @@
 mod viewer_rules;
 
 mod cli {
+    mod axes;
     mod bad_input;
     mod compare;
     mod crash;

@@ -72,7 +72,8 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     warnings.extend(fusion.warnings.iter().cloned());
     let (input_name, output_name) =
         (args.log.display().to_string(), destination.path(&log).display().to_string());
-    let notes: Vec<String> = log.visibility().note().into_iter().collect();
+    let of_sources = loaded.iter().flat_map(|l| l.notes.iter().cloned());
+    let notes: Vec<String> = of_sources.chain(log.visibility().note()).collect();
     let report = Report::new(&report::Parts {
         input: &input_name,
         output: &output_name,

@@ -176,7 +176,9 @@ pub struct SourceConfig {
     pub time: Option<TimeChoice>,
     /// How long before its time a sample was taken, s.
     pub latency_s: f64,
-    /// Added to every position, m: the vector, in the track's frame, from what is measured to what is tracked.
+    /// Lever arm, added to every position, m: the vector from what is measured to what is tracked, along the axes of the
+    /// vehicle's body, turned by the orientation beside the position; along the track's axes where there is none. A
+    /// velocity is taken as it is: what the vehicle's turning adds to it along the lever arm is not taken off.
     pub offset_m: [f64; 3],
     /// Frame of its velocities; default: `body` for `nav_msgs/Odometry` and `foxglove.Odometry`, else `world`.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -170,6 +170,15 @@ pub enum SourceError {
         /// What its messages hold.
         found: String,
     },
+    /// Two topics that are to be one source, but are not a position and a velocity.
+    #[error(
+        "{} and {} are not one source: expected a topic with a position and one with a velocity",
+        candidates[0], candidates[1]
+    )]
+    NoPair {
+        /// What the topics hold.
+        candidates: Box<[Candidate; 2]>,
+    },
     /// Two of what there can be one of.
     #[error(
         "the {what} of the reference is given twice, by {} and by {}; expected one",
