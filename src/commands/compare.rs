@@ -68,9 +68,11 @@ fn heights_of_events(log: &Log, topic: &str) -> Result<(Vec<Height>, Vec<String>
     let prefix = topic.rsplit_once('/').map_or("", |(prefix, _)| prefix);
     let events = format!("{prefix}/events");
     let channels = log.index().channels_of(&events).map(|c| c.id).collect();
+    let decoders = source::decoders(log, &channels);
     let mut found: Vec<(Time, Height)> = Vec::new();
     let read = log.for_each_message(&channels, |message| {
-        let value: serde_json::Value = serde_json::from_slice(message.data).unwrap_or_default();
+        let value = decoders.get(&message.channel_id).and_then(|d| d.decode(message.data).ok());
+        let value = value.map(|v| v.to_json()).unwrap_or_default();
         if let (Some(name), Some(z_m)) = (value["name"].as_str(), value["position"]["z"].as_f64()) {
             let time = Time::from_log(message.log_time).unwrap_or(Time::from_ns(0));
             found.push((time, Height { name: name.to_owned(), z_m }));

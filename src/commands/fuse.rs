@@ -9,8 +9,12 @@ use super::{CommandError, Outcome, beside, damage_of, note, say};
 use crate::cli::Fuse;
 use crate::config::Config;
 use crate::fusion::{self, Fusion};
-use crate::log::{Appender, Destination, Log, LogError, MessagesRead, NewMetadata, ReadOptions, put_back};
-use crate::publish::{Context, Topic, messages};
+use crate::log::{
+    Appender, Destination, Encoding, Log, LogError, MessagesRead, NewMessage, NewMetadata, ReadOptions,
+    put_back,
+};
+use crate::math::geodesy::{Geodetic, LocalFrame};
+use crate::publish::{Context, Published, Topic, messages};
 use crate::report::{self, Report};
 use crate::resolve;
 use crate::sample::Source;
@@ -42,8 +46,10 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     let log = open(&args.log, options)?;
     let mut warnings = damage_of(&log, args.strict)?;
     let destination = destination(args);
-    let channels = Topic::ALL.map(|topic| topic.channel(&config.output.prefix));
-    Appender::check(&log, &destination, &channels)?;
+    let usual = Encoding::of_profile(&log.index().profile);
+    let encoding = *config.output.encoding.get_or_insert(usual);
+    let all = Topic::channels(&Topic::written(encoding, true), &config.output.prefix, encoding);
+    Appender::check(&log, &destination, &all)?;
 
     let named = !config.source.is_empty();
     let Recognised { unused, warnings: of_sources, bad_chunks, .. } = choose_sources(&log, &mut config)?;
@@ -75,7 +81,7 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     warnings.extend(fusion.warnings.iter().cloned());
     let (input_name, output_name) =
         (args.log.display().to_string(), destination.path(&log).display().to_string());
-    let notes: Vec<String> = log.visibility().note().into_iter().collect();
+    let notes: Vec<String> = log.visibility().note().into_iter().chain(encoding.note(usual)).collect();
     let report = Report::new(&report::Parts {
         input: &input_name,
         output: &output_name,
@@ -100,18 +106,16 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         t0,
         surface_at_zero: config.output.surface_at_zero == Some(true),
         log_start: resolve::log_start(&log, shift_s),
+        encoding,
+        geodetic: config.output.origin.map(|place| LocalFrame::new(Geodetic::from_degrees(place))),
     };
+    let topics = Topic::written(encoding, context.geodetic.is_some());
     let metadata = metadata(&log, &config, &report)?;
+    let channels = Topic::channels(&topics, &config.output.prefix, encoding);
     let mut appender = Appender::begin(&log, &destination, &channels, config.output.compression)?;
     appender.leave_out(bad_chunks.into_iter().chain(read.bad_chunks()));
     bar.doing("writing the track");
-    for message in messages(&fusion, context, &text, &warnings) {
-        appender.write(crate::log::NewMessage {
-            channel: message.topic as usize,
-            time_ns: message.time.plus_seconds(shift_s.unwrap_or(0.0)).to_log(),
-            data: &message.data,
-        })?;
-    }
+    write(&mut appender, messages(&fusion, context, &text, &warnings), &topics, shift_s)?;
     appender.write_metadata(&metadata)?;
     appender.finish()?;
     drop(bar);
@@ -123,6 +127,21 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     let text = format!("{files}\n\n{text}");
     say(args.voice, &text, &report, &warnings);
     Ok(if warnings.is_empty() { Outcome::Done } else { Outcome::Warned })
+}
+
+/// Writes the messages of `topics`, whose channels are the appender's, on the log's clock.
+fn write(
+    appender: &mut Appender<'_>,
+    messages: impl Iterator<Item = Published>,
+    topics: &[Topic],
+    shift_s: Option<f64>,
+) -> Result<(), LogError> {
+    for message in messages {
+        let Some(channel) = topics.iter().position(|&topic| topic == message.topic) else { continue };
+        let time_ns = message.time.plus_seconds(shift_s.unwrap_or(0.0)).to_log();
+        appender.write(NewMessage { channel, time_ns, data: &message.data })?;
+    }
+    Ok(())
 }
 
 /// Refuses damage that showed when the sources were read, where only a whole log will do.

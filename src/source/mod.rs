@@ -20,6 +20,7 @@ pub use glimpse::{Glimpse, glimpse};
 pub use load::{Loaded, Samples, SigmaOrigin, Timing, datum, load};
 pub use propose::{Proposal, propose, propose_chosen};
 pub use recognise::{Choice, Recognised, choices_of, recognise};
+pub(crate) use recorded::decoders;
 pub use recorded::{Recorded, recorded, reference};
 pub use topic::is_datum_like;
 

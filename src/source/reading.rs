@@ -220,9 +220,12 @@ impl Reader {
         if !vector.orientations.is_empty() {
             let turn = |path: &MessagePath| path.resolve(message).ok().flatten().and_then(rotation);
             let turn = vector.orientations.iter().find_map(turn).ok_or(Fault::NoOrientation)?;
-            value = turn(value);
-            // turned, the axes mix: one sigma for all keeps the total
-            sigma = sigma.map(|s| [(s.iter().map(|s| s * s).sum::<f64>() / 3.0).sqrt(); 3]);
+            let turned = turn(value);
+            if turned != value {
+                // the axes mix: one sigma for all keeps the total
+                sigma = sigma.map(|s| [(s.iter().map(|s| s * s).sum::<f64>() / 3.0).sqrt(); 3]);
+            }
+            value = turned;
         }
         if self.axes == Axes::Ned {
             value = [value[1], value[0], -value[2]];
