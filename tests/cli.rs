@@ -21,6 +21,7 @@ mod cli {
     mod init;
     mod inspect;
     mod output;
+    mod output_encodings;
     mod readme;
     mod real_logs;
     mod report;

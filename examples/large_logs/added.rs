@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use trackfuse::log::{Appender, Compression, Destination, Log};
+use trackfuse::log::{Appender, Compression, Destination, Encoding, Log};
 use trackfuse::log::{LogError, NewMessage};
 use trackfuse::publish::{Context, Topic, track_messages};
 use trackfuse::sample::Source;
@@ -37,9 +37,12 @@ pub(crate) fn add(input: &Path, to: &Destination, track: &Track) -> Result<(), L
         t0: zero,
         surface_at_zero: true,
         log_start: None,
+        encoding: Encoding::Json,
+        geodetic: None,
     };
     let log = if matches!(to, Destination::InPlace) { Log::open_in_place(input) } else { Log::open(input) }?;
-    let mut appender = Appender::begin(&log, to, &[Topic::Track.channel("/added")], Compression::Zstd)?;
+    let mut appender =
+        Appender::begin(&log, to, &[Topic::Track.channel("/added", Encoding::Json)], Compression::Zstd)?;
     for message in track_messages(Topic::Track, track, context) {
         let (time_ns, data) = (message.time.to_log(), &message.data[..]);
         appender.write(NewMessage { channel: 0, time_ns, data })?;

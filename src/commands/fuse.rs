@@ -9,8 +9,12 @@ use super::{CommandError, Outcome, beside, checked, html_report, note, options, 
 use crate::cli::Fuse;
 use crate::config::Config;
 use crate::fusion::{self, Fusion};
-use crate::log::{Appender, Destination, Log, LogError, NewMetadata, ReadOptions, bad_chunks, put_back};
-use crate::publish::{Context, Topic, messages};
+use crate::log::{
+    Appender, Destination, Encoding, Log, LogError, NewMessage, NewMetadata, ReadOptions, bad_chunks,
+    put_back,
+};
+use crate::math::geodesy::{Geodetic, LocalFrame};
+use crate::publish::{Context, Published, Topic, messages};
 use crate::report::{self, Report, html};
 use crate::resolve;
 use crate::sample::Source;
@@ -37,8 +41,10 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     let open = if args.in_place { Log::open_in_place_with } else { Log::open_with };
     let (log, mut warnings) = checked(open(&args.log, options)?, args.strict)?;
     let destination = destination(args);
-    let channels = Topic::ALL.map(|topic| topic.channel(&config.output.prefix));
-    Appender::check(&log, &destination, &channels)?;
+    let usual = Encoding::of_profile(&log.index().profile);
+    let encoding = *config.output.encoding.get_or_insert(usual);
+    let all = Topic::channels(&Topic::written(encoding, true), &config.output.prefix, encoding);
+    Appender::check(&log, &destination, &all)?;
     html_report::check(args, &log, &destination)?;
 
     let named = !config.source.is_empty();
@@ -73,7 +79,7 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     let (input_name, output_name) =
         (args.log.display().to_string(), destination.path(&log).display().to_string());
     let of_sources = loaded.iter().flat_map(|l| l.notes.iter().cloned());
-    let notes: Vec<String> = of_sources.chain(log.visibility().note()).collect();
+    let notes: Vec<String> = of_sources.chain(log.visibility().note()).chain(encoding.note(usual)).collect();
     let report = Report::new(&report::Parts {
         input: &input_name,
         output: &output_name,
@@ -98,20 +104,18 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         t0,
         surface_at_zero: config.output.surface_at_zero == Some(true),
         log_start: resolve::log_start(&log, shift_s),
+        encoding,
+        geodetic: config.output.origin.map(|place| LocalFrame::new(Geodetic::from_degrees(place))),
     };
+    let topics = Topic::written(encoding, context.geodetic.is_some());
     let metadata = metadata(&log, &config, &report)?;
     let parts = html::fusion::Parts { report: &report, fusion: &fusion, sources: &sources, origin, t0 };
     let page = html_report::prepare(args, parts, &metadata)?;
+    let channels = Topic::channels(&topics, &config.output.prefix, encoding);
     let mut appender = Appender::begin(&log, &destination, &channels, config.output.compression)?;
     appender.leave_out(bad_chunks(&damaged));
     bar.doing("writing the track");
-    for message in messages(&fusion, context, &text, &warnings) {
-        appender.write(crate::log::NewMessage {
-            channel: message.topic as usize,
-            time_ns: message.time.plus_seconds(shift_s.unwrap_or(0.0)).to_log(),
-            data: &message.data,
-        })?;
-    }
+    write(&mut appender, messages(&fusion, context, &text, &warnings), &topics, shift_s)?;
     appender.add_metadata(metadata);
     appender.finish()?;
     html_report::publish(page, &output_name)?;
@@ -125,6 +129,21 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
 fn files(args: &Fuse, input: &str, output: &str) -> String {
     let log = if args.in_place { format!("{input}, in place") } else { format!("{input} -> {output}") };
     args.report.as_ref().map_or(log.clone(), |page| format!("{log}, {}", page.display()))
+}
+
+/// Writes the messages of `topics`, whose channels are the appender's, on the log's clock.
+fn write(
+    appender: &mut Appender<'_>,
+    messages: impl Iterator<Item = Published>,
+    topics: &[Topic],
+    shift_s: Option<f64>,
+) -> Result<(), LogError> {
+    for message in messages {
+        let Some(channel) = topics.iter().position(|&topic| topic == message.topic) else { continue };
+        let time_ns = message.time.plus_seconds(shift_s.unwrap_or(0.0)).to_log();
+        appender.write(NewMessage { channel, time_ns, data: &message.data })?;
+    }
+    Ok(())
 }
 
 /// Refuses damage that showed when the sources were looked for and read, where only a whole log will do.

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::estimate::registration::{Kind, Priors};
 use crate::estimate::{Coefficients, Estimator};
-use crate::log::Compression;
+use crate::log::{Compression, Encoding};
 
 /// Why a config can't be used.
 #[derive(Debug, thiserror::Error)]
@@ -115,6 +115,10 @@ pub struct Output {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(example = [42.3758, -71.1474, 7.3])]
     pub origin: Option<[f64; 3]>,
+    /// What the new messages are encoded in; default: `cdr` where the log's profile is `ros2`, else `json`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = &"protobuf")]
+    pub encoding: Option<Encoding>,
     /// Compression of the new chunks.
     pub compression: Compression,
     /// T0, from which times count, ns; default: the datum's first sample.
@@ -135,6 +139,7 @@ impl Default for Output {
             rate_hz: None,
             frame_id: None,
             origin: None,
+            encoding: None,
             compression: Compression::Zstd,
             t0_ns: None,
             surface_at_zero: None,

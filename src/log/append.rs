@@ -82,7 +82,8 @@ impl<'a> Appender<'a> {
             left_out: BTreeSet::new(),
         };
         if is_sidecar {
-            appender.put(&summary::start())?;
+            let is_ros2 = !channels.is_empty() && channels.iter().all(|c| c.schema_encoding == "ros2msg");
+            appender.put(&summary::start(if is_ros2 { "ros2" } else { "" }))?;
         } else {
             appender.complete_torn_chunk(log)?;
             appender.keep_old_tail()?;

@@ -66,7 +66,7 @@ mod undo;
 pub mod verify;
 mod visibility;
 
-pub use addition::{Compression, NewChannel, NewMessage, NewMetadata};
+pub use addition::{Compression, Encoding, NewChannel, NewMessage, NewMetadata};
 pub use append::{Appender, Written};
 pub use damage::Damage;
 pub use error::LogError;

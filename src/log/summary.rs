@@ -11,10 +11,10 @@ use super::index::SummaryRecord;
 
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
-/// What a log of nobody's profile begins with.
-pub(super) fn start() -> Vec<u8> {
-    let header =
-        Header { profile: String::new(), library: format!("trackfuse {}", env!("CARGO_PKG_VERSION")) };
+/// What a log of this profile begins with.
+pub(super) fn start(profile: &str) -> Vec<u8> {
+    let library = format!("trackfuse {}", env!("CARGO_PKG_VERSION"));
+    let header = Header { profile: profile.to_owned(), library };
     [MAGIC, &encode(op::HEADER, &header)].concat()
 }
 

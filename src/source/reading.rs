@@ -230,9 +230,12 @@ impl Reader {
         match turn {
             Some(turn) if offset_is_turned => value = sum(value, turn(self.offset_m)),
             Some(turn) => {
-                value = turn(value);
-                // turned, the axes mix: one sigma for all keeps the total
-                sigma = sigma.map(|s| [(s.iter().map(|s| s * s).sum::<f64>() / 3.0).sqrt(); 3]);
+                let turned = turn(value);
+                if turned != value {
+                    // the axes mix: one sigma for all keeps the total
+                    sigma = sigma.map(|s| [(s.iter().map(|s| s * s).sum::<f64>() / 3.0).sqrt(); 3]);
+                }
+                value = turned;
             }
             None if vector.quantity == Quantity::Velocity && !vector.orientations.is_empty() => {
                 return Err(Fault::NoOrientation);

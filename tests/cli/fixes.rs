@@ -67,8 +67,58 @@ fn fixes_count_from_the_first_by_default_and_the_origin_makes_the_track_again() 
     // what the track is held to counts from the same origin
     let ran = trackfuse(trial.folder(), &["compare", "in.fused.mcap", "--reference", "/gps/fix", "--json"]);
     let report: Value = serde_json::from_str(&ran.stdout).unwrap();
-    let rmse = report["all"]["position"]["rmse"].as_f64();
-    assert!(rmse.is_none_or(|rmse| rmse < 0.2), "{}", ran.stdout);
+    let rmse = report["all"]["position_m"]["rmse"].as_f64().unwrap();
+    assert!(rmse < 0.2, "{}", ran.stdout);
+}
+
+#[test]
+fn fixes_of_the_track_lie_where_the_track_does_and_a_map_gets_its_lines_and_points() {
+    let config = format!("{CONFIG}[[characteristic_point]]\nname = \"half way\"\nz_m = -40.0\n");
+    let trial = Trial::of(log_of_fixes(|_, _| {})).config(&config);
+    let (_, output) = trial.report(0);
+    let frame = LocalFrame::new(Geodetic::from_degrees(ORIGIN));
+    let enu = |latitude: &Value, longitude: &Value, altitude: &Value| {
+        let degrees = [latitude, longitude, altitude].map(|v| v.as_f64().unwrap());
+        frame.to_enu(Geodetic::from_degrees(degrees))
+    };
+    let (fixes, track) = (&output.topics["/fused/fix"], output.track());
+    assert!(fixes.len() * 2 == track.len() || fixes.len() * 2 == track.len() + 1, "10 Hz of 20 Hz");
+    for (fix, point) in fixes.iter().zip(track.iter().step_by(2)) {
+        let (p, sigma) = (point.vector("position"), point.vector("position_sigma"));
+        let at = enu(&fix.value["latitude"], &fix.value["longitude"], &fix.value["altitude"]);
+        assert_eq!(fix.log_time, point.log_time);
+        assert!((0..3).all(|i| (at[i] - p[i]).abs() < 2e-3), "{at:?} {p:?}");
+        for i in 0..3 {
+            let variance = fix.value["position_covariance"][4 * i].as_f64().unwrap();
+            assert!((variance - sigma[i] * sigma[i]).abs() < 1e-5 * sigma[i].max(1.0));
+        }
+        assert_eq!(fix.value["position_covariance_type"], 2, "along the diagonal");
+    }
+    let [map] = output.topics["/fused/geojson"].as_slice() else { panic!("one message") };
+    let map: Value = serde_json::from_str(map.value["geojson"].as_str().unwrap()).unwrap();
+    assert_eq!(map["type"], "FeatureCollection");
+    let features = map["features"].as_array().unwrap();
+    let of = |kind: &str| features.iter().filter(|f| f["geometry"]["type"] == kind).collect::<Vec<_>>();
+    let names = of("LineString").iter().map(|f| f["properties"]["name"].clone()).collect::<Vec<_>>();
+    assert_eq!(names, ["single", "extrapolated"]);
+    let colors: Vec<_> =
+        features.iter().map(|f| f["properties"]["style"]["color"].as_str().unwrap()).collect();
+    assert_eq!(colors, ["#56b4e9", "#d55e00", "#56b4e9"]);
+    let [point] = of("Point")[..] else { panic!("one point") };
+    assert_eq!(point["properties"]["name"], "half way");
+    let at = &point["geometry"]["coordinates"];
+    assert!((enu(&at[1], &at[0], &at[2])[2] + 40.0).abs() < 2e-3, "{at}");
+    let first = &of("LineString")[0]["geometry"]["coordinates"][0];
+    assert!(
+        (0..3)
+            .all(|i| (enu(&first[1], &first[0], &first[2])[i] - track[0].vector("position")[i]).abs() < 2e-3)
+    );
+}
+
+#[test]
+fn fixes_are_not_made_up_where_nothing_says_where_the_track_is() {
+    let (_, output) = Trial::of(super::trial_log::two_sensors()).report(0);
+    assert!(output.topics.keys().all(|topic| topic != "/fused/fix" && topic != "/fused/geojson"));
 }
 
 #[test]
