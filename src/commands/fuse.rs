@@ -63,6 +63,13 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     config.source[datum].datum = true;
     // moved: copies would double what millions of samples take
     let sources: Vec<Source> = loaded.iter_mut().map(|l| std::mem::take(&mut l.source)).collect();
+    let geodetic = config.output.origin.map(|place| LocalFrame::new(Geodetic::from_degrees(place)));
+    let topics = Topic::written(encoding, geodetic.is_some());
+    let channels = Topic::channels(&topics, &config.output.prefix, encoding);
+    let compression = config.output.compression;
+    let begin = || Appender::begin(&log, &destination, &channels, compression);
+    // a new file's copy of the log gets on while the track is fitted; the log itself is not touched before it must be
+    let begun = if args.in_place { None } else { Some(begin()?) };
     bar.doing("fitting");
     let plan = resolve::plan(&mut config, &loaded, &sources, datum, origin, &mut warnings)?;
     let fusion = fusion::fuse(&sources, &plan)?;
@@ -105,14 +112,12 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         surface_at_zero: config.output.surface_at_zero == Some(true),
         log_start: resolve::log_start(&log, shift_s),
         encoding,
-        geodetic: config.output.origin.map(|place| LocalFrame::new(Geodetic::from_degrees(place))),
+        geodetic,
     };
-    let topics = Topic::written(encoding, context.geodetic.is_some());
     let metadata = metadata(&log, &config, &report)?;
     let parts = html::fusion::Parts { report: &report, fusion: &fusion, sources: &sources, origin, t0 };
     let page = html_report::prepare(args, parts, &metadata)?;
-    let channels = Topic::channels(&topics, &config.output.prefix, encoding);
-    let mut appender = Appender::begin(&log, &destination, &channels, config.output.compression)?;
+    let mut appender = begun.map_or_else(begin, Ok)?;
     appender.leave_out(bad_chunks(&damaged));
     bar.doing("writing the track");
     write(&mut appender, messages(&fusion, context, &text, &warnings), &topics, shift_s)?;

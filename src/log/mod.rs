@@ -31,6 +31,7 @@ mod by_index;
 mod checksum;
 mod chunk;
 mod contents;
+mod copying;
 #[cfg(test)]
 mod crash;
 mod damage;

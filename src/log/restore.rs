@@ -6,11 +6,12 @@ use std::path::Path;
 use mcap::records::{DataEnd, op};
 
 use super::checksum::crc_of_start;
+use super::copying::copy_start;
 use super::file::{At, LogFile};
 use super::index::read_record;
 use super::interrupt::Writing;
 use super::new_file::{check_name, publish, readable_by_the_same, temporary_beside};
-use super::output::{check_output, copy_behind, copy_start, ensure_in_place, is_same_file};
+use super::output::{check_output, copy_behind, ensure_in_place, is_same_file};
 use super::undo::{self, Undo, for_each_piece};
 use super::{Log, LogError, ReadOptions, old_tail};
 
@@ -225,8 +226,8 @@ fn write_original(
     (out, force): (&Path, bool),
 ) -> Result<(), LogError> {
     let _writing = Writing::begin();
-    let mut file = temporary_beside(out, readable_by_the_same(&log.file))?;
-    copy_start(log, data_end, file.as_file_mut(), out)?;
+    let file = temporary_beside(out, readable_by_the_same(&log.file))?;
+    copy_start(log, data_end, file.as_file(), out)?;
     copy_behind(tail, tail_len, file.as_file(), data_end, out)?;
     publish(file, out, force)
 }
