@@ -51,8 +51,8 @@ pub struct Appender<'a> {
 }
 
 impl<'a> Appender<'a> {
-    /// Starts the successor of `log`, with all `channels`, and copies the data section of one that is a new
-    /// file. All checks come before the copy.
+    /// Starts the successor of `log`, with all `channels`. The data section of one that is a new file is copied
+    /// from now on, beside other work, until [`Appender::finish`]. All checks come before the copy.
     ///
     /// # Errors
     /// [`LogError::OutputIsInput`]; [`LogError::OutputExists`] unless forced; [`LogError::NotInPlace`];
