@@ -8,7 +8,7 @@ use tempfile::TempDir;
 use trackfuse::inspect::inspect;
 use trackfuse::log::verify::verify as verify_file;
 use trackfuse::log::{
-    Appender, Compression, Destination, Log, LogError, NewChannel, NewMessage, ReadOptions,
+    Appender, Compression, Destination, Log, LogError, NewChannel, NewMessage, ReadOptions, Visibility,
 };
 
 thread_local! {
@@ -48,9 +48,9 @@ pub fn open(data: &[u8]) {
         let (first, damaged) = log.first_messages(&log.index().channels.keys().copied().collect());
         if read.is_ok() {
             assert!(damaged.is_empty(), "the same parts were read before: {damaged:?}");
+            // Message indexes that lie may hide a channel's first one, and make none up.
             for (id, message) in first {
-                let same = found.iter().find(|(channel, ..)| *channel == id);
-                assert_eq!(same, Some(&(id, message.log_time, message.data.len())));
+                assert!(found.contains(&(id, message.log_time, message.data.len())), "channel {id}");
             }
         }
         let _ = inspect(&log, "/fused");
@@ -101,7 +101,11 @@ pub fn append(data: &[u8]) {
         let output = fs::read(&out).expect("the output");
         assert!(output.starts_with(&data[..end]), "the data section changed");
         let successor = Log::open(&out).expect("the output opens as the input did");
-        if let (old, Ok(())) = messages(&log) {
+        // Past a record without an end the old summary's entries lead on, also those that the new one must not have.
+        let is_lost = !log.damage().is_empty() && matches!(log.visibility(), Visibility::Partly { .. });
+        if let (old, Ok(())) = messages(&log)
+            && !is_lost
+        {
             let (new, read) = messages(&successor);
             assert!(read.is_ok(), "{read:?}");
             assert_eq!((new.len(), &new[..old.len()]), (old.len() + 1, &old[..]));
