@@ -75,7 +75,9 @@ pub fn plan(
     let Config { output, fusion: fuse, extrapolation: beyond, .. } = config;
     output.rate_hz = Some(rate_hz);
     let frame_id = output.frame_id.get_or_insert_with(|| loaded[datum].frame_id.clone()).clone();
-    output.surface_at_zero.get_or_insert_with(|| surface_at_zero(sources));
+    // altitudes are above the ellipsoid, from which the sea may be a hundred metres away
+    let is_altitude = loaded[datum].fix_origin.is_some();
+    output.surface_at_zero.get_or_insert_with(|| !is_altitude && surface_at_zero(sources));
     let kinds = match &fuse.estimate {
         Registration::Auto(_) => Kind::ALL.to_vec(),
         Registration::List(kinds) => kinds.clone(),

@@ -58,9 +58,10 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     let left_out: Vec<String> = left_out.into_iter().filter(|sentence| !known(sentence)).collect();
     warnings.extend(left_out);
     config.source = loaded.iter().map(|l| l.config.clone()).collect();
-    config.output.origin = config.output.origin.or(loaded.iter().find_map(|l| l.fix_origin));
     let datum = source::datum(&config.source);
     config.source[datum].datum = true;
+    // another source's frame is not the track's
+    config.output.origin = config.output.origin.or(loaded[datum].fix_origin);
     // moved: copies would double what millions of samples take
     let sources: Vec<Source> = loaded.iter_mut().map(|l| std::mem::take(&mut l.source)).collect();
     let geodetic = config.output.origin.map(|place| LocalFrame::new(Geodetic::from_degrees(place)));

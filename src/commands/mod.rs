@@ -146,9 +146,12 @@ impl CommandError {
         }
     }
 
-    /// 2 where the user's words are at fault, else 1.
+    /// 2 where the user's words are at fault, 3 where a log is written all the same, else 1.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
+        if matches!(self, Self::ReportLost { .. }) {
+            return 3;
+        }
         let usage = match self {
             Self::Config(_)
             | Self::Resolve(_)

@@ -111,7 +111,7 @@ pub struct Output {
     #[schemars(example = &"enu")]
     pub frame_id: Option<String>,
     /// Latitude and longitude, degrees, and altitude, m, of the track's zero (WGS 84): from there latitudes and longitudes
-    /// become metres east, north and up; default: the first fix of the datum, else of the first source that has one.
+    /// become metres east, north and up; default: the datum's first fix.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(example = [42.3758, -71.1474, 7.3])]
     pub origin: Option<[f64; 3]>,
@@ -126,7 +126,7 @@ pub struct Output {
     #[schemars(example = 1_731_000_000_000_000_000_i64)]
     pub t0_ns: Option<i64>,
     /// Whether z = 0 is the sea surface, so that points carry a depth; default: when every observed position
-    /// lies below z = 2 m and some below -2 m.
+    /// lies below z = 2 m and some below -2 m, unless the datum's heights count from the altitude of a fix.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(example = true)]
     pub surface_at_zero: Option<bool>,

@@ -194,7 +194,7 @@ pub fn register(
     let mut frames: Vec<(usize, rotation::Frame)> = Vec::new();
     for source in others() {
         let late = (source, guesses[source].clock_offset_s);
-        mirrored[source] = rotation::mirrored(sources, datum, late, &coverage);
+        mirrored[source] = rotation::mirrored(sources, datum, late, &coverage, &settings.priors);
         if mirrored[source].is_some() {
             guesses[source] = Guess::default();
             continue;

@@ -155,17 +155,24 @@ pub(super) fn mirrored(
     datum: usize,
     (source, offset_s): (usize, f64),
     coverage: &Coverage,
+    priors: &Priors,
 ) -> Option<Mirrored> {
     let (from, to) = (&sources[datum].positions, &sources[source].positions);
     let max_gap_s = coverage.outage_s(datum, Quantity::Position);
     // of the level and the height, what is left as they are, and mirrored
     let (mut level, mut vertical) = ([f64::INFINITY; 2], [f64::INFINITY; 2]);
+    // what a drift may put between axes that are the same, where a path is slow or straight
+    let mut drifted_m = 0.0;
     for offset_s in [0.0, offset_s] {
         let mut pairs = pairs(from, to, offset_s, max_gap_s);
         if pairs.len() < MIN_PAIRS {
             continue;
         }
         centre(&mut pairs);
+        let middle_s = pairs.iter().map(|p| p.time_s).sum::<f64>() / pairs.len() as f64;
+        let away_s =
+            robust::median(&mut pairs.iter().map(|p| (p.time_s - middle_s).abs()).collect::<Vec<_>>());
+        drifted_m = f64::max(drifted_m, SIGNIFICANT_SIGMAS * priors.drift_m_s * away_s.unwrap_or(0.0));
         let swapped: Vec<Pair> =
             pairs.iter().map(|p| Pair { source: [p.source[1], p.source[0], p.source[2]], ..*p }).collect();
         for (i, (pairs, sign)) in [(&pairs, 1.0), (&swapped, -1.0)].into_iter().enumerate() {
@@ -176,7 +183,8 @@ pub(super) fn mirrored(
             vertical[i] = vertical[i].min(left.unwrap_or(f64::INFINITY));
         }
     }
-    let is_mirrored = |[plain, mirrored]: [f64; 2]| mirrored < MIRRORED * plain && plain.is_finite();
+    let is_mirrored =
+        |[plain, mirrored]: [f64; 2]| mirrored < MIRRORED * (plain - drifted_m) && plain.is_finite();
     match (is_mirrored(level), is_mirrored(vertical)) {
         (true, true) => Some(Mirrored::Ned),
         (true, false) => Some(Mirrored::Level),

@@ -419,6 +419,16 @@ fn with_second(seed: u64, changed: Change) -> Vec<Source> {
 }
 
 #[test]
+fn a_drift_that_undoes_a_slow_climb_is_no_mirrored_height() {
+    let slow = |t: f64| ([1.5 * t, (0.2 * t).sin(), 0.012 * t], [1.5, 0.2 * (0.2 * t).cos(), 0.012]);
+    let errors = SourceErrors { drift_m_s: [0.0, 0.0, -0.024], ..SourceErrors::default() };
+    let first = Sensor { step_s: 0.2, ..Sensor::datum(slow, 0.0, 200.0, 6) };
+    let second = Sensor { errors, middle_s: 100.0, seed: 7, ..first };
+    let found = registered(&[first.watch("first"), second.watch("second")]);
+    assert_eq!(found.mirrored, [None, None]);
+}
+
+#[test]
 fn mirrored_axes_are_told_and_never_registered_as_a_rotation() {
     let cases: [(Change, Option<Mirrored>); 5] = [
         (|[x, y, z]| [y, x, -z], Some(Mirrored::Ned)),

@@ -100,9 +100,18 @@ function drawSpace(place, space, tables) {
         ctx.fillRect(x - 0.8, y - 0.8, 1.6, 1.6);
       });
     });
-    for (let i = 1; i < path.length; i++) {
-      if (isPlace(path[i - 1]) && isPlace(path[i])) line([path[i - 1], path[i]], color(PHASES[phases[i]]), 2.2);
-    }
+    // a line to a point has its phase's colour; one stroke a phase, since thousands would be slow to turn
+    let run = [], phase = phases[0];
+    const stroke = () => run.length > 1 && line(run, color(PHASES[phase]), 2.2);
+    path.forEach((p, i) => {
+      const goesOn = i > 0 && isPlace(path[i - 1]) && isPlace(p);
+      if (!goesOn || phases[i] !== phase) {
+        stroke();
+        [run, phase] = [goesOn ? [path[i - 1]] : [], phases[i]];
+      }
+      if (isPlace(p)) run.push(p);
+    });
+    stroke();
     drawMarks({ ctx, to, ellipse });
   }
 
