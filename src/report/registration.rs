@@ -163,10 +163,15 @@ pub(super) fn write(out: &mut String, report: &RegistrationReport) -> fmt::Resul
     let mut before = "";
     for kind in shown.chunk_by(same) {
         let first = kind[0];
-        let values: Vec<String> =
-            kind.iter().map(|u| format!("{} ± {}", signed(u.value), digits(u.sigma))).collect();
+        // people turn things by degrees
+        let (unit, per_rad) =
+            if first.unit == "rad" { ("deg", 1f64.to_degrees()) } else { (first.unit.as_str(), 1.0) };
+        let value =
+            |u: &&UnknownReport| format!("{} ± {}", signed(per_rad * u.value), digits(per_rad * u.sigma));
+        let values: Vec<String> = kind.iter().map(value).collect();
         let verdicts: Vec<&str> = kind.iter().map(|u| u.separation.as_str()).collect();
-        let verdict = if verdicts.iter().all(|v| *v == "at-prior") {
+        let is_clear = kind.iter().any(|u| u.value.abs() > 3.0 * u.sigma);
+        let verdict = if verdicts.iter().all(|v| *v == "at-prior") && !is_clear {
             "next to nothing".into()
         } else if let Some(u) = kind.iter().find(|u| u.separation == "only-together") {
             let axis = u.axis.as_ref().map_or(String::new(), |axis| format!("{axis} "));
@@ -182,7 +187,7 @@ pub(super) fn write(out: &mut String, report: &RegistrationReport) -> fmt::Resul
             "{source:<22} {:<14} {:<62} {:<4} {:>6.0} %  {verdict}",
             first.kind.name(),
             values.join(", "),
-            first.unit,
+            unit,
             100.0 * first.probability
         )?;
         before = &first.source;

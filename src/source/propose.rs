@@ -69,7 +69,7 @@ pub fn propose(log: &Log, prefix: &str) -> Result<Proposal, SourceError> {
 }
 
 /// The sources that a person chose, the datum first: each a topic, or two with a comma between them, of which one
-/// holds its position and the other its velocity. Topics whose names say so are of one sensor too: see [`paired`].
+/// holds its position and the other its velocity. Topics whose names say so are of one sensor too: see `paired`.
 ///
 /// # Errors
 /// [`SourceError::NoTopic`], [`SourceError::Decode`], [`SourceError::NoVectors`] for a topic that can't be one;

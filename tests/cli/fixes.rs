@@ -167,6 +167,8 @@ fn fixes_and_odometry_of_a_real_robot_are_chosen_on_the_command_line_and_never_f
     let (value, sigma) = (rotation["value"].as_f64().unwrap(), rotation["sigma"].as_f64().unwrap());
     assert!((value.to_degrees() + 128.2).abs() < 3.0 * sigma.to_degrees() && sigma < 0.05, "{rotation}");
     assert_says(&report["warnings"].to_string(), &["still disagree in position after registration"]);
+    let degrees = format!("{:+.3} ± {:.1} ", value.to_degrees(), sigma.to_degrees());
+    assert_says(&trial.fuse(&["--force"]).stdout, &["rotation", &degrees, " deg "]);
     // the way that the fixes span is 58 m by 146 m
     let span = |axis: usize| {
         let all = || output.track().iter().map(|w| w.vector("position")[axis]);
