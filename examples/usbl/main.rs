@@ -2,7 +2,7 @@
 mod judge;
 use judge::{ROWS, smoothed};
 
-fn main() {
+pub fn main() {
     let runs: u64 = std::env::args().nth(1).and_then(|a| a.parse().ok()).unwrap_or(20);
     for row in &ROWS {
         let t = std::time::Instant::now();
