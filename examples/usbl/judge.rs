@@ -6,6 +6,7 @@ use std::thread;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use trackfuse::estimate::usbl::causal::Predictor;
 use trackfuse::estimate::usbl::{self, Cleaned, Verdict, Warning};
 use trackfuse::sample::Sample;
 use trackfuse::simulate::{
@@ -21,11 +22,15 @@ pub(crate) struct Row {
     pub(crate) wild_cycles: f64,
 }
 
-pub(crate) const ROWS: [Row; 4] = [
+pub(crate) const ROWS: [Row; 8] = [
     Row { name: "none", wild_fixes: 0.0, wild_cycles: 0.0 },
     Row { name: "30 % single", wild_fixes: 0.3, wild_cycles: 0.0 },
     Row { name: "10 % whole cycles", wild_fixes: 0.0, wild_cycles: 0.1 },
     Row { name: "30 % whole cycles", wild_fixes: 0.0, wild_cycles: 0.3 },
+    Row { name: "60 % single", wild_fixes: 0.6, wild_cycles: 0.0 },
+    Row { name: "30/30", wild_fixes: 0.3, wild_cycles: 0.3 },
+    Row { name: "40 % whole cycles", wild_fixes: 0.0, wild_cycles: 0.4 },
+    Row { name: "50 % whole cycles", wild_fixes: 0.0, wild_cycles: 0.5 },
 ];
 
 /// Instants at which tracks are held against the truth, s apart.
@@ -213,4 +218,38 @@ pub(crate) fn over<T: Send>(seeds: std::ops::Range<u64>, work: impl Fn(u64) -> T
     let mut done = done.into_inner().expect("no thread panicked");
     done.sort_by_key(|(seed, _)| *seed);
     done.into_iter().map(|(_, made)| made).collect()
+}
+
+/// Times ahead at which a prediction is held against the truth, s.
+pub(crate) const LEADS_S: [f64; 3] = [20.0, 60.0, 180.0];
+
+/// What a causal method's predictions are worth, by time ahead.
+pub(crate) fn predicted<P: Predictor>(
+    row: &Row,
+    seeds: std::ops::Range<u64>,
+    new: impl Fn() -> P + Sync,
+) -> [Sum; 3] {
+    let all = over(seeds, |seed| {
+        let heard = Heard::new(row, seed);
+        let mut method = new();
+        let mut sums = [Sum::default(); 3];
+        for (i, fix) in heard.fixes.iter().enumerate() {
+            method.push(fix);
+            if heard.fixes.get(i + 1).is_some_and(|next| next.time_s - fix.time_s < 5.0) {
+                continue;
+            }
+            // the exchange is over; in the next one's absence this is what there is
+            method.advance(fix.time_s + 6.0);
+            for (sum, lead) in sums.iter_mut().zip(LEADS_S) {
+                let t = fix.time_s + lead;
+                if let Some(state) = method.at(t).filter(|_| t <= DiveConstants::default().duration_s) {
+                    sum.add(&state, heard.truth.at(t).position.into());
+                }
+            }
+        }
+        sums
+    });
+    let mut total = [Sum::default(); 3];
+    all.iter().for_each(|own| total.iter_mut().zip(own).for_each(|(all, own)| all.merge(own)));
+    total
 }

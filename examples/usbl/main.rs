@@ -1,12 +1,24 @@
 //! Dives with known truth.
 mod judge;
-use judge::{ROWS, smoothed};
+use judge::{ROWS, smoothed, predicted};
+use trackfuse::estimate::usbl::causal::*;
 
 pub fn main() {
     let runs: u64 = std::env::args().nth(1).and_then(|a| a.parse().ok()).unwrap_or(20);
-    for row in &ROWS {
+    let first: u64 = std::env::args().nth(2).and_then(|a| a.parse().ok()).unwrap_or(1);
+    let show = |name: &str, s: [judge::Sum; 3]| println!("   {name:10} {:.1} / {:.1} / {:.1}   cov {:.1} {:.1} {:.1}  n {}", s[0].rmse(), s[1].rmse(), s[2].rmse(), 100.0*s[0].coverage(), 100.0*s[1].coverage(), 100.0*s[2].coverage(), s[0].instants);
+    if std::env::var_os("CAUSAL").is_some() {
+        for row in &ROWS[..4] {
+            println!("{}", row.name);
+            show("paper", predicted(row, first..runs + first, || Paper::new(PaperSettings::default())));
+            show("improved", predicted(row, first..runs + first, || Improved::new(ImprovedSettings::default())));
+            for m in [60.0, 100.0, 200.0] { show(&format!("memory {m}"), predicted(row, first..runs + first, || Paper::new(PaperSettings { memory_s: Some(m), ..Default::default() }))); }
+        }
+        return;
+    }
+    for row in &ROWS[..4] {
         let t = std::time::Instant::now();
-        let j = smoothed(row, 1..runs + 1);
+        let j = smoothed(row, first..runs + first);
         println!(
             "{:18} {:.2} / {:.2}  cov {:.1} / {:.1}  recall {:.2} fa {:.2} warned {} worst unwarned {:.1}  {:.1} ms/dive",
             row.name, j.sums[0].rmse(), j.sums[1].rmse(), 100.0 * j.sums[0].coverage(), 100.0 * j.sums[1].coverage(),

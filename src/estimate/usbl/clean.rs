@@ -49,11 +49,12 @@ const ROUNDS: usize = 4;
 const LIVELY_STEPS: usize = 6;
 
 /// Of more exchanges thrown out than this share nobody can say that the others are right.
-const MANY_WILD: f64 = 0.2;
+const MANY_WILD: f64 = 0.35;
 
 /// Another track is worth a warning when it is this likely beside ours, and so many metres and sigmas off.
 const RIVAL_ODDS: f64 = 0.05;
 const RIVAL_SIGMAS: f64 = 3.0;
+const RIVAL_FIX_SIGMAS: f64 = 5.0;
 
 /// A noise that differs by this factor from what was stated is worth a warning.
 const NOISE_FACTOR: f64 = 1.5;
@@ -116,7 +117,7 @@ pub fn clean(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Resul
             return Err(EstimateError::TooFewSamples { what: "usbl".into(), needed, got });
         }
     }
-    let first_scale = cycles::first_noise_scale(&usable, &groups);
+    let mut first_scale = cycles::first_noise_scale(&usable, &groups);
     let scaled = |scale: [f64; 2]| -> Vec<Sample> {
         let by_axis = [scale[0], scale[0], scale[1]];
         let of = |f: &Sample| Sample { sigma: std::array::from_fn(|a| f.sigma[a] * by_axis[a]), ..*f };
@@ -125,19 +126,30 @@ pub fn clean(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Resul
 
     // a first search with a density that suits the dive
     let within_m_s = 0.3 * settings.speed_limit_m_s;
-    let (found, candidates) = exchanges(&scaled([first_scale; 2]), &groups, PRIOR_WILD, within_m_s);
-    let enough = &found[..found.len().min(ENOUGH)];
+    let (mut found, mut candidates) = exchanges(&scaled([first_scale; 2]), &groups, PRIOR_WILD, within_m_s);
     let motion = |density: [f64; 2]| Motion {
         density: [density[0], density[0], density[1]],
         speed_limit_m_s: settings.speed_limit_m_s,
     };
     let (low, high, count) = DENSITIES;
-    let tried = (0..count).map(|i| {
-        let exponent = low + (high - low) * i as f64 / (count - 1) as f64;
-        let density = settings.speed_limit_m_s.powi(2) * 10.0_f64.powf(exponent);
-        (density, search(enough, &candidates, PRIOR_WILD, motion([density; 2])).log_likelihood)
-    });
-    let density = tried.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0.0, |best| best.0);
+    let likeliest = |found: &[Exchange], candidates: &[Candidate]| {
+        let enough = &found[..found.len().min(ENOUGH)];
+        let tried = (0..count).map(|i| {
+            let exponent = low + (high - low) * i as f64 / (count - 1) as f64;
+            let density = settings.speed_limit_m_s.powi(2) * 10.0_f64.powf(exponent);
+            (density, search(enough, candidates, PRIOR_WILD, motion([density; 2])).log_likelihood)
+        });
+        tried.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((settings.speed_limit_m_s.powi(2), 0.0))
+    };
+    let (mut density, likelihood) = likeliest(&found, &candidates);
+    if first_scale != 1.0 {
+        // many wild fixes look like much noise: whichever explains more
+        let other = exchanges(&scaled([1.0; 2]), &groups, PRIOR_WILD, within_m_s);
+        let as_stated = likeliest(&other.0, &other.1);
+        if as_stated.1 > likelihood {
+            (found, candidates, density, first_scale) = (other.0, other.1, as_stated.0, 1.0);
+        }
+    }
     let first = search(&found, &candidates, PRIOR_WILD, motion([density; 2]));
 
     // what it says of noise, motion and wild shares, then a second one that knows
@@ -394,7 +406,8 @@ fn warnings(
         let sigma = |e: usize| track.at(dive.exchanges[e].time_s).position_sigma.iter().fold(0.0, |s: f64, v| s.max(*v));
         let sigma = (dispute.from..=dispute.to).map(sigma).fold(0.0, f64::max);
         let odds = dispute.log_odds.exp();
-        if odds > RIVAL_ODDS && dispute.apart_m > RIVAL_SIGMAS * sigma {
+        let fix_sigma = dive.fixes[dive.exchanges[dispute.to].fixes.start].sigma.iter().fold(0.0, |s: f64, v| s.max(*v));
+        if odds > RIVAL_ODDS && dispute.apart_m > RIVAL_SIGMAS * sigma && dispute.apart_m > RIVAL_FIX_SIGMAS * fix_sigma {
             warnings.push(Warning::Ambiguous { from_s, to_s, apart_m: dispute.apart_m, odds });
         }
     }

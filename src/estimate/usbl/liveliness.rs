@@ -24,6 +24,10 @@ const HALF_SILENCE_S: f64 = 600.0;
 /// In silence the whole dive's density is worth this long, s.
 const SILENCE_PRIOR_S: f64 = 300.0;
 
+/// A mean over the few turns that were heard is unsure, and turns aren't normal numbers: the density is so much higher than
+/// the mean for a 95 % band. Chosen on simulated dives (seeds 1001 to 1100).
+const UNSURE: f64 = 1.35;
+
 /// An interval is a silence that is this many times the usual one.
 const SILENCE: f64 = 2.5;
 
@@ -84,7 +88,7 @@ fn local(sums: &[[f64; 2]], now: &[f64], nodes_s: &[f64], overall: f64, usual_s:
         let reach = HALF_SILENCE_S + 0.5 * (nodes_s[k + 1] - nodes_s[k]);
         let (from, to) = window(nodes_s, middle, reach);
         let [sum, heard_s] = [0, 1].map(|j| energy[to.max(k + 1)][j] - energy[from.min(k)][j]);
-        found[k] = (sum + SILENCE_PRIOR_S * overall) / (heard_s + SILENCE_PRIOR_S);
+        found[k] = UNSURE * (sum + SILENCE_PRIOR_S * overall) / (heard_s + SILENCE_PRIOR_S);
     }
     found
 }

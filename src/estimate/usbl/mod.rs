@@ -39,6 +39,7 @@
 //!
 //! Where the data can't carry the track, [`Cleaned::warnings`] says so.
 
+pub mod causal;
 pub mod cycles;
 
 mod candidates;

@@ -82,60 +82,132 @@ struct Choice {
 
 /// The likeliest history of all.
 pub(super) fn search(exchanges: &[Exchange], candidates: &[Candidate], wild: WildShares, motion: Motion) -> Found {
-    let mut steps: Vec<Step> = Vec::with_capacity(exchanges.len() * BEAM / 2);
-    let mut beam: Vec<History> = Vec::with_capacity(2 * BEAM);
-    let mut choices: Vec<Choice> = Vec::new();
-    let mut next: Vec<History> = Vec::with_capacity(2 * BEAM);
-    let mut firsts = Vec::with_capacity(exchanges.len());
-    for (e, exchange) in exchanges.iter().enumerate() {
-        let dt_s = if e == 0 { 0.0 } else { exchange.time_s - exchanges[e - 1].time_s };
-        beam.iter_mut().for_each(|h| h.carry(dt_s, motion.density));
+    let mut beam = Beam::new(wild, motion);
+    exchanges.iter().for_each(|exchange| beam.step(exchange, candidates));
+    beam.found()
+}
+
+/// Histories, the likeliest first.
+#[derive(Clone, Debug)]
+pub(super) struct Beam {
+    wild: WildShares,
+    motion: Motion,
+    histories: Vec<History>,
+    steps: Vec<Step>,
+    /// The first step of each exchange.
+    firsts: Vec<usize>,
+    /// Times and likeliest candidates of the first exchanges.
+    early: Vec<(f64, Candidate)>,
+    now_s: f64,
+}
+
+impl Beam {
+    pub(super) fn new(wild: WildShares, motion: Motion) -> Self {
+        let (histories, steps, firsts, early) = Default::default();
+        Self { wild, motion, histories, steps, firsts, early, now_s: f64::NEG_INFINITY }
+    }
+
+    /// Takes an exchange in, `candidates` being those that its range means.
+    pub(super) fn step(&mut self, exchange: &Exchange, candidates: &[Candidate]) {
+        let dt_s = exchange.time_s - self.now_s;
+        self.histories.iter_mut().for_each(|h| h.carry(dt_s, self.motion.density));
+        self.now_s = exchange.time_s;
         let own = &candidates[exchange.candidates.clone()];
-        choices.clear();
-        for (i, history) in beam.iter().enumerate() {
-            let off = history.off(&own[0], wild);
+        let mut choices = Vec::with_capacity(self.histories.len() * (1 + own.len()));
+        for (i, history) in self.histories.iter().enumerate() {
+            let off = history.off(&own[0], self.wild);
             choices.push(Choice { history: i, candidate: None, score: history.score + off });
             for (c, candidate) in own.iter().enumerate() {
-                let score = history.score + history.fits(candidate, exchange.time_s, wild);
+                let score = history.score + history.fits(candidate, exchange.time_s, self.wild);
                 choices.push(Choice { history: i, candidate: Some(exchange.candidates.start + c), score });
             }
         }
-        next.clear();
-        firsts.push(steps.len());
+        self.firsts.push(self.steps.len());
         choices.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let mut next: Vec<History> = Vec::with_capacity(BEAM + own.len());
         for choice in &choices {
             if next.len() == BEAM {
                 break;
             }
-            let mut history = beam[choice.history];
+            let mut history = self.histories[choice.history];
             history.score = choice.score;
             if let Some(c) = choice.candidate {
                 history.update(&candidates[c], exchange.time_s);
-                history.limit(motion.speed_limit_m_s);
+                history.limit(self.motion.speed_limit_m_s);
             }
-            keep(history, choice.candidate, &mut next, &mut steps);
+            keep(history, choice.candidate, &mut next, &mut self.steps);
         }
-        if e < LATEST_START {
-            let before = &exchanges[..e];
-            for c in exchange.candidates.clone() {
-                let history = History::start(&candidates[c], exchange, before, candidates, wild, motion);
-                keep(history, Some(c), &mut next, &mut steps);
+        if self.early.len() < LATEST_START {
+            for (c, candidate) in own.iter().enumerate() {
+                let history = History::start(candidate, exchange.time_s, &self.early, self.wild, self.motion);
+                keep(history, Some(exchange.candidates.start + c), &mut next, &mut self.steps);
             }
+            self.early.push((exchange.time_s, own[0]));
         }
         next.sort_by(|a, b| b.score.total_cmp(&a.score));
         next.truncate(BEAM);
-        std::mem::swap(&mut beam, &mut next);
+        self.histories = next;
     }
-    let Some(best) = beam.first() else {
-        return Found { chosen: Vec::new(), log_likelihood: f64::NEG_INFINITY, disputes: Vec::new() };
-    };
-    let mut found = trace(best, &steps, &firsts);
-    for rival in &beam[1..] {
-        if best.score - rival.score < RIVAL {
-            found.disputes.extend(dispute(best.past, rival.past, rival.score - best.score, &steps, &firsts));
+
+    /// The likeliest history's decisions.
+    fn found(&self) -> Found {
+        let Some(best) = self.histories.first() else {
+            return Found { chosen: Vec::new(), log_likelihood: f64::NEG_INFINITY, disputes: Vec::new() };
+        };
+        let mut found = trace(best, &self.steps, &self.firsts);
+        for rival in &self.histories[1..] {
+            let log_odds = rival.score - best.score;
+            if log_odds > -RIVAL {
+                found.disputes.extend(dispute(best.past, rival.past, log_odds, &self.steps, &self.firsts));
+            }
         }
+        found
     }
-    found
+
+    /// Forgets the decisions, which only [`search`] needs, and counts the likelihood from here on; returns what it was.
+    pub(super) fn forget(&mut self) -> f64 {
+        self.steps.clear();
+        self.firsts.clear();
+        let best = self.histories.first().map_or(0.0, |h| h.score);
+        for history in &mut self.histories {
+            history.past = NONE;
+            history.score -= best;
+        }
+        best
+    }
+
+    /// Position and velocity with their variances by axis at a later instant, all histories taken together.
+    pub(super) fn at(&self, time_s: f64) -> Option<[[[f64; 2]; 2]; 3]> {
+        let best = self.histories.first()?.score;
+        let dt_s = (time_s - self.now_s).max(0.0);
+        let mut sums = [[[0.0; 2]; 2]; 3];
+        let mut total = 0.0;
+        for history in &self.histories {
+            let weight = (history.score - best).exp();
+            let mut history = *history;
+            history.carry(dt_s, self.motion.density);
+            total += weight;
+            for axis in 0..3 {
+                let [pp, _, vv] = history.covariance[axis];
+                for (k, variance) in [pp, vv].into_iter().enumerate() {
+                    let value = history.state[axis][k];
+                    // about the likeliest history's, or the squares would lose their digits
+                    let apart = value - self.histories[0].ahead(axis, dt_s)[k];
+                    sums[axis][k][0] += weight * apart;
+                    sums[axis][k][1] += weight * (variance + apart * apart);
+                }
+            }
+        }
+        for (axis, sum) in sums.iter_mut().enumerate() {
+            let ahead = self.histories[0].ahead(axis, dt_s);
+            for (k, [mean, square]) in sum.iter_mut().enumerate() {
+                let apart = *mean / total;
+                *square = *square / total - apart * apart;
+                *mean = ahead[k] + apart;
+            }
+        }
+        Some(sums)
+    }
 }
 
 /// Keeps a history, or has it as the rival of one that is now the same.
@@ -213,21 +285,13 @@ fn dispute(mut a: u32, mut b: u32, log_odds: f64, steps: &[Step], firsts: &[usiz
 
 impl History {
     /// One that believes `first` and nothing before.
-    fn start(
-        first: &Candidate,
-        exchange: &Exchange,
-        before: &[Exchange],
-        candidates: &[Candidate],
-        wild: WildShares,
-        motion: Motion,
-    ) -> Self {
+    fn start(first: &Candidate, time_s: f64, early: &[(f64, Candidate)], wild: WildShares, motion: Motion) -> Self {
         let speed = 0.5 * motion.speed_limit_m_s;
         let mut score = (1.0 - wild.cycle).ln() + first.log_inside;
-        for other in before {
-            let own = &candidates[other.candidates.start];
-            let far = motion.speed_limit_m_s * (exchange.time_s - other.time_s);
-            let usual = least_wild_m2(own.variance) + far * far;
-            score += wild.cycle.ln() + own.log_inside + log_off(square(minus(own.mean, first.mean)), usual);
+        for (other_s, other) in early {
+            let far = motion.speed_limit_m_s * (time_s - other_s);
+            let usual = least_wild_m2(other.variance) + far * far;
+            score += wild.cycle.ln() + other.log_inside + log_off(square(minus(other.mean, first.mean)), usual);
         }
         Self {
             state: first.mean.map(|p| [p, 0.0]),
@@ -237,9 +301,15 @@ impl History {
         }
     }
 
+    /// Position and velocity of an axis `dt_s` later.
+    fn ahead(&self, axis: usize, dt_s: f64) -> [f64; 2] {
+        let [p, v] = self.state[axis];
+        [p + dt_s * v, v]
+    }
+
     fn carry(&mut self, dt_s: f64, density: [f64; 3]) {
         for axis in 0..3 {
-            self.state[axis][0] += dt_s * self.state[axis][1];
+            self.state[axis] = self.ahead(axis, dt_s);
             self.covariance[axis] = carried(self.covariance[axis], dt_s, density[axis]);
         }
     }
