@@ -45,8 +45,11 @@ const ENOUGH: usize = 300;
 /// Most rounds in which switches are looked at anew.
 const ROUNDS: usize = 4;
 
+/// Steps to the density of the acceleration, from a first guess.
+const FIRST_STEPS: usize = 4;
+
 /// Steps with a liveliness that changes in time.
-const LIVELY_STEPS: usize = 6;
+const LIVELY_STEPS: usize = 5;
 
 /// Of more exchanges thrown out than this share nobody can say that the others are right.
 const MANY_WILD: f64 = 0.35;
@@ -156,7 +159,7 @@ pub fn clean(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Resul
     let dive = Dive::new(scaled([first_scale; 2]), found, candidates, heights);
     let mut switches = Switches::new(&dive, &first.chosen, PRIOR_WILD);
     let mut fit = Fit { scale: [1.0; 2], density: [density; 2], speed_m_s: 0.5 * settings.speed_limit_m_s };
-    fit.settle(&dive, &switches)?;
+    fit.settle(&dive, &switches, FIRST_STEPS)?;
     let wild = switches.shares(PRIOR_WILD, PRIOR_WORTH);
     let scale = fit.scale.map(|s| s * first_scale);
     let scaled_fixes = scaled(scale);
@@ -167,12 +170,12 @@ pub fn clean(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Resul
     fit.scale = [1.0; 2];
 
     // every switch against the track without its exchange
-    let mut track = fit.settle(&dive, &switches)?;
+    let mut track = fit.settle(&dive, &switches, FIRST_STEPS / 2)?;
     for _ in 0..ROUNDS {
         if !switches.revise(&dive, &track, fit.scale) {
             break;
         }
-        track = fit.settle(&dive, &switches)?;
+        track = fit.settle(&dive, &switches, 1)?;
     }
     // a liveliness that changes in time, and fixes one by one
     for _ in 0..LIVELY_STEPS {
@@ -212,14 +215,13 @@ struct Fit {
 
 impl Fit {
     /// Fits with one density for the whole dive, found by restricted likelihood.
-    fn settle(&mut self, dive: &Dive, switches: &Switches) -> Result<Wiener, EstimateError> {
-        const STEPS: usize = 5;
+    fn settle(&mut self, dive: &Dive, switches: &Switches, steps: usize) -> Result<Wiener, EstimateError> {
         let intervals = dive.nodes_s.len() - 1;
         for step in 0.. {
             let [h, z] = self.density;
             let track = self.track(dive, switches, [h, h, z].map(|q| vec![q; intervals]))?;
             self.noise(dive, switches, &track);
-            if step == STEPS {
+            if step == steps {
                 return Ok(track);
             }
             let factor = liveliness::factors(&track);

@@ -41,6 +41,7 @@
 
 pub mod causal;
 pub mod cycles;
+pub mod geometry;
 
 mod candidates;
 mod clean;

@@ -11,8 +11,10 @@
 //! which makes a matrix of half-bandwidth 3. Between nodes the track is the cubic through both states, with the
 //! variance that (1) leaves between them: nothing is approximated.
 
+use std::sync::Arc;
+
 use crate::estimate::EstimateError;
-use crate::math::banded::Banded;
+use crate::math::banded::{Banded, Cholesky};
 use crate::math::robust;
 use crate::track::State;
 
@@ -34,11 +36,6 @@ impl Knowledge {
         self.right[0] += weight * z;
         self.right[1] += weight * dt_s * z;
     }
-
-    /// Weight of all positions.
-    pub(super) fn weight(&self) -> f64 {
-        self.gram[0]
-    }
 }
 
 /// One axis of the track at the nodes.
@@ -46,7 +43,8 @@ impl Knowledge {
 struct Axis {
     /// p_k, v_k one after the other.
     states: Vec<[f64; 1]>,
-    covariance: Banded,
+    /// Shared by axes that were measured alike.
+    covariance: Arc<Banded>,
     /// q between node k and the next, m^2/s^3.
     density: Vec<f64>,
 }
@@ -87,19 +85,15 @@ impl Wiener {
         density: [Vec<f64>; 3],
         speed_m_s: f64,
     ) -> Result<Self, EstimateError> {
-        let mut axis = 0;
-        let mut fitted = density.map(|density| {
-            let fitted = fit_axis(times_s, knowledge.iter().map(|k| &k[axis]), density, speed_m_s);
-            axis += 1;
-            fitted
-        });
-        if fitted.iter().any(Option::is_none) {
-            let why = "too few fixes agree with each other";
-            return Err(EstimateError::Undetermined { what: "usbl".into(), why });
-        }
-        let [Some(x), Some(y), Some(z)] = fitted.each_mut().map(Option::take) else {
-            return Err(EstimateError::Undetermined { what: "usbl".into(), why: "an axis is open" });
-        };
+        let open = EstimateError::Undetermined { what: "usbl".into(), why: "too few fixes agree with each other" };
+        let [x_density, y_density, z_density] = density;
+        let alike = x_density == y_density && knowledge.iter().all(|[x, y, _]| x.gram == y.gram);
+        let of = |axis: usize| knowledge.iter().map(move |k| &k[axis]);
+        let z = fit_axis(times_s, of(2), z_density, speed_m_s, None).ok_or_else(|| open.clone())?;
+        let x = fit_axis(times_s, of(0), x_density, speed_m_s, None).ok_or_else(|| open.clone())?;
+        let known = alike.then_some((&x.1, &x.0.covariance));
+        let y = fit_axis(times_s, of(1), y_density, speed_m_s, known).ok_or(open)?;
+        let (x, y, z) = (x.0, y.0, z.0);
         Ok(Self { times_s: times_s.to_vec(), axes: [x, y, z] })
     }
 
@@ -205,20 +199,41 @@ fn bridge(q: f64, a: f64, b: f64) -> [f64; 2] {
     [q * vv / determinant, q * pp / determinant]
 }
 
+/// One axis, with its factor; `known` are factor and covariance of an axis that was measured alike.
 fn fit_axis<'a>(
     times_s: &[f64],
-    knowledge: impl Iterator<Item = &'a Knowledge>,
+    knowledge: impl Iterator<Item = &'a Knowledge> + Clone,
     density: Vec<f64>,
     speed_m_s: f64,
-) -> Option<Axis> {
+    known: Option<(&Arc<Cholesky>, &Arc<Banded>)>,
+) -> Option<(Axis, Arc<Cholesky>)> {
     let n = times_s.len();
-    let mut gram = Banded::zeros(2 * n, 3);
     let mut states = vec![[0.0]; 2 * n];
+    for (k, known) in knowledge.clone().enumerate() {
+        states[2 * k][0] = known.right[0];
+        states[2 * k + 1][0] = known.right[1];
+    }
+    let (cholesky, covariance) = if let Some((cholesky, covariance)) = known {
+        (Arc::clone(cholesky), Arc::clone(covariance))
+    } else {
+        let cholesky = Arc::new(normal_equations(times_s, knowledge, &density, speed_m_s).cholesky()?);
+        let covariance = Arc::new(cholesky.selected_inverse());
+        (cholesky, covariance)
+    };
+    cholesky.solve(&mut states);
+    Some((Axis { states, covariance, density }, cholesky))
+}
+
+fn normal_equations<'a>(
+    times_s: &[f64],
+    knowledge: impl Iterator<Item = &'a Knowledge>,
+    density: &[f64],
+    speed_m_s: f64,
+) -> Banded {
+    let mut gram = Banded::zeros(2 * times_s.len(), 3);
     for (k, known) in knowledge.enumerate() {
         let [w, wt, wtt] = known.gram;
         gram.add_block(2 * k, &[[w, wt], [wt, wtt]]);
-        states[2 * k][0] = known.right[0];
-        states[2 * k + 1][0] = known.right[1];
     }
     gram.add_to_diagonal(1, speed_m_s.powi(-2));
     for (k, pair) in times_s.windows(2).enumerate() {
@@ -226,9 +241,7 @@ fn fit_axis<'a>(
             gram.add_outer(2 * k, &row, density[k].recip());
         }
     }
-    let cholesky = gram.cholesky()?;
-    cholesky.solve(&mut states);
-    Some(Axis { states, covariance: cholesky.selected_inverse(), density })
+    gram
 }
 
 /// The median time between nodes, s.
