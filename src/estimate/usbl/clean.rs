@@ -37,7 +37,7 @@ const PRIOR_WORTH: f64 = 20.0;
 
 /// The lowest and highest density of the acceleration that are looked at, over the square of the speed limit, as powers
 /// of ten: 1/s; and how many.
-const DENSITIES: (f64, f64, usize) = (-5.0, -2.0, 7);
+const DENSITIES: (f64, f64, usize) = (-5.0, -2.0, 5);
 
 /// So many exchanges tell the density well enough for the first search.
 const ENOUGH: usize = 300;

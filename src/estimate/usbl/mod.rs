@@ -80,3 +80,6 @@ fn in_order(fixes: &[Sample]) -> Vec<usize> {
     order.sort_by(|&a, &b| fixes[a].time_s.total_cmp(&fixes[b].time_s));
     order
 }
+
+#[cfg(test)]
+mod tests;

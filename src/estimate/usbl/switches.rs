@@ -139,15 +139,15 @@ impl Switches {
             }
             for i in exchange.fixes.clone() {
                 let fix = &dive.fixes[i];
-                let state = track.at(fix.time_s);
+                let dt = fix.time_s - exchange.time_s;
                 let noise: [f64; 3] = std::array::from_fn(|a| (fix.sigma[a] * scale[a / 2]).powi(2));
-                let apart = minus(fix.value, state.position);
                 let (mut predicted, mut variance) = ([0.0; 3], [0.0; 3]);
                 for a in 0..3 {
-                    let known = state.position_sigma[a].powi(2);
+                    let ([p, v], [pp, pv, vv]) = track.node(a, dive.node_of[e]);
+                    let known = pp + dt * (2.0 * pv + dt * vv);
                     // a used fix has pulled the track towards itself
                     let share = if self.used[i] { (known / noise[a]).min(0.9) } else { 0.0 };
-                    predicted[a] = apart[a] / (1.0 - share);
+                    predicted[a] = (fix.value[a] - p - dt * v) / (1.0 - share);
                     variance[a] = noise[a] + known / (1.0 - share);
                 }
                 let fits = (1.0 - wild.fix).ln() + log_normal(predicted, variance);

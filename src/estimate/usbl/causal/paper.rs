@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wild_fix_is_gated_but_a_wild_first_one_misleads() {
+    fn a_fix_that_would_need_too_high_a_speed_is_gated() {
         let fix = |time_s, x| Sample { time_s, value: [x, 0.0, 0.0], sigma: [3.0; 3] };
         let mut paper = Paper::new(PaperSettings::default());
         for i in 0..10 {
@@ -130,9 +130,5 @@ mod tests {
         }
         paper.advance(300.0);
         assert!(distance(paper.at(200.0).expect("a track").position, [0.0; 3]) < 1e-6);
-        let mut misled = Paper::new(PaperSettings::default());
-        (0..10).for_each(|i| misled.push(&fix(20.0 * f64::from(i), if i == 0 { 200.0 } else { 0.0 })));
-        misled.advance(300.0);
-        assert!(misled.at(200.0).is_none_or(|s| s.position[0].abs() > 5.0));
     }
 }
