@@ -1,5 +1,6 @@
 //! Dives with known truth, and how far a track of their fixes is from it.
 
+use std::ops::Range;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
@@ -9,9 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use trackfuse::estimate::usbl::causal::Predictor;
 use trackfuse::estimate::usbl::{self, Cleaned, Verdict, Warning};
 use trackfuse::sample::Sample;
-use trackfuse::simulate::{
-    DiveConstants, Trajectory, UsblConstants, UsblRecord, dive, watch_by_usbl,
-};
+use trackfuse::simulate::{DiveConstants, Trajectory, UsblConstants, UsblRecord, dive, watch_by_usbl};
 use trackfuse::track::{Curve, State};
 
 /// What is wild in a row of the tables.
@@ -22,15 +21,11 @@ pub(crate) struct Row {
     pub(crate) wild_cycles: f64,
 }
 
-pub(crate) const ROWS: [Row; 8] = [
+pub(crate) const ROWS: [Row; 4] = [
     Row { name: "none", wild_fixes: 0.0, wild_cycles: 0.0 },
     Row { name: "30 % single", wild_fixes: 0.3, wild_cycles: 0.0 },
     Row { name: "10 % whole cycles", wild_fixes: 0.0, wild_cycles: 0.1 },
     Row { name: "30 % whole cycles", wild_fixes: 0.0, wild_cycles: 0.3 },
-    Row { name: "60 % single", wild_fixes: 0.6, wild_cycles: 0.0 },
-    Row { name: "30/30", wild_fixes: 0.3, wild_cycles: 0.3 },
-    Row { name: "40 % whole cycles", wild_fixes: 0.0, wild_cycles: 0.4 },
-    Row { name: "50 % whole cycles", wild_fixes: 0.0, wild_cycles: 0.5 },
 ];
 
 /// Instants at which tracks are held against the truth, s apart.
@@ -51,8 +46,11 @@ impl Heard {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let constants = DiveConstants::default();
         let truth = dive(&constants, &mut rng);
-        let watched =
-            UsblConstants { wild_fixes: row.wild_fixes, wild_cycles: row.wild_cycles, ..UsblConstants::default() };
+        let watched = UsblConstants {
+            wild_fixes: row.wild_fixes,
+            wild_cycles: row.wild_cycles,
+            ..UsblConstants::default()
+        };
         let record = watch_by_usbl(&truth, constants.duration_s, &watched, &mut rng);
         let fixes = record.fixes.iter().map(|f| f.sample).collect();
         Self { truth, record, fixes }
@@ -184,7 +182,7 @@ impl Judged {
 }
 
 /// The smoother over the dives of these seeds.
-pub(crate) fn smoothed(row: &Row, seeds: std::ops::Range<u64>) -> Judged {
+pub(crate) fn smoothed(row: &Row, seeds: Range<u64>) -> Judged {
     let all = over(seeds, |seed| {
         let heard = Heard::new(row, seed);
         let cleaned = usbl::clean(&heard.fixes, &[], &usbl::Settings::default()).expect("a track");
@@ -197,8 +195,34 @@ pub(crate) fn smoothed(row: &Row, seeds: std::ops::Range<u64>) -> Judged {
     sum
 }
 
+/// A causal method over the dives of these seeds: what it said at every instant of what had been heard by then.
+pub(crate) fn followed<P: Predictor>(row: &Row, seeds: Range<u64>, new: impl Fn() -> P + Sync) -> [Sum; 2] {
+    let all = over(seeds, |seed| {
+        let heard = Heard::new(row, seed);
+        let (mut method, mut next) = (new(), heard.fixes.iter().peekable());
+        let mut sums = [Sum::default(); 2];
+        for t in heard.instants() {
+            while let Some(fix) = next.next_if(|fix| fix.time_s <= t) {
+                method.push(fix);
+            }
+            method.advance(t);
+            if let Some(state) = method.at(t) {
+                sums[usize::from(heard.silent(t))].add(&state, heard.truth.at(t).position.into());
+            }
+        }
+        sums
+    });
+    total(&all)
+}
+
+fn total<const N: usize>(all: &[[Sum; N]]) -> [Sum; N] {
+    let mut total = [Sum::default(); N];
+    all.iter().for_each(|own| total.iter_mut().zip(own).for_each(|(all, own)| all.merge(own)));
+    total
+}
+
 /// `work` of every seed, in their order, on all cores.
-pub(crate) fn over<T: Send>(seeds: std::ops::Range<u64>, work: impl Fn(u64) -> T + Sync) -> Vec<T> {
+pub(crate) fn over<T: Send>(seeds: Range<u64>, work: impl Fn(u64) -> T + Sync) -> Vec<T> {
     let next = AtomicU64::new(seeds.start);
     let done = Mutex::new(Vec::new());
     thread::scope(|scope| {
@@ -224,11 +248,7 @@ pub(crate) fn over<T: Send>(seeds: std::ops::Range<u64>, work: impl Fn(u64) -> T
 pub(crate) const LEADS_S: [f64; 3] = [20.0, 60.0, 180.0];
 
 /// What a causal method's predictions are worth, by time ahead.
-pub(crate) fn predicted<P: Predictor>(
-    row: &Row,
-    seeds: std::ops::Range<u64>,
-    new: impl Fn() -> P + Sync,
-) -> [Sum; 3] {
+pub(crate) fn predicted<P: Predictor>(row: &Row, seeds: Range<u64>, new: impl Fn() -> P + Sync) -> [Sum; 3] {
     let all = over(seeds, |seed| {
         let heard = Heard::new(row, seed);
         let mut method = new();
@@ -249,7 +269,5 @@ pub(crate) fn predicted<P: Predictor>(
         }
         sums
     });
-    let mut total = [Sum::default(); 3];
-    all.iter().for_each(|own| total.iter_mut().zip(own).for_each(|(all, own)| all.merge(own)));
-    total
+    total(&all)
 }

@@ -1,31 +1,123 @@
-//! Dives with known truth.
-mod judge;
-use judge::{ROWS, smoothed, predicted};
-use trackfuse::estimate::usbl::causal::*;
+//! USBL dives with known truth through every method: the tables of `docs/usbl.md`.
+//!
+//! ```sh
+//! cargo run --release --example usbl -- --page docs/usbl.md
+//! ```
+//!
+//! Without `--page` the tables are printed. The same arguments give the same tables.
 
-pub fn main() {
-    let runs: u64 = std::env::args().nth(1).and_then(|a| a.parse().ok()).unwrap_or(20);
-    let first: u64 = std::env::args().nth(2).and_then(|a| a.parse().ok()).unwrap_or(1);
-    let show = |name: &str, s: [judge::Sum; 3]| println!("   {name:10} {:.1} / {:.1} / {:.1}   cov {:.1} {:.1} {:.1}  n {}", s[0].rmse(), s[1].rmse(), s[2].rmse(), 100.0*s[0].coverage(), 100.0*s[1].coverage(), 100.0*s[2].coverage(), s[0].instants);
-    if std::env::var_os("CAUSAL").is_some() {
-        for row in &ROWS[..4] {
-            println!("{}", row.name);
-            show("paper", predicted(row, first..runs + first, || Paper::new(PaperSettings::default())));
-            show("improved", predicted(row, first..runs + first, || Improved::new(ImprovedSettings::default())));
-            for m in [60.0, 100.0, 200.0] { show(&format!("memory {m}"), predicted(row, first..runs + first, || Paper::new(PaperSettings { memory_s: Some(m), ..Default::default() }))); }
-        }
-        return;
+mod judge;
+#[path = "../study/page.rs"]
+mod page;
+
+use std::fmt::Write as _;
+use std::fs;
+use std::ops::Range;
+use std::path::PathBuf;
+
+use clap::Parser;
+use judge::{ROWS, Row, Sum, followed, predicted, smoothed};
+use trackfuse::estimate::usbl::causal::{Improved, ImprovedSettings, Paper, PaperSettings};
+
+/// USBL dives with known truth through every method, as Markdown tables
+#[derive(Parser)]
+struct Arguments {
+    /// Dives a row
+    #[arg(long, default_value_t = 200)]
+    runs: u64,
+    /// The page whose tables are made anew, instead of printing them
+    #[arg(long)]
+    page: Option<PathBuf>,
+}
+
+/// What was to be reached, by row of [`ROWS`].
+const TARGETS: [&str; 4] = ["1.5 / 12", "1.8 / 12", "1.8 / 13", "5 / 25, or a warning"];
+
+/// The paper's method, and the same with a memory of this many seconds: the best of 40 to 200 without wild fixes.
+fn paper(memory_s: Option<f64>) -> Paper {
+    Paper::new(PaperSettings { memory_s, ..PaperSettings::default() })
+}
+const MEMORY_S: f64 = 60.0;
+
+fn improved() -> Improved {
+    Improved::new(ImprovedSettings::default())
+}
+
+fn table(columns: &str, rows: impl Iterator<Item = String>) -> String {
+    let mut text = format!("| {columns} |\n|{}\n", "---|".repeat(columns.split('|').count()));
+    rows.for_each(|row| writeln!(text, "| {row} |").expect("a String takes all"));
+    text
+}
+
+fn percent(share: f64) -> String {
+    if share.is_finite() { format!("{:.1}", 100.0 * share) } else { "-".into() }
+}
+
+fn short(value: f64) -> String {
+    if value < 20.0 { format!("{value:.2}") } else { format!("{value:.0}") }
+}
+
+fn errors(sums: &[Sum]) -> String {
+    sums.iter().map(|sum| short(sum.rmse())).collect::<Vec<_>>().join(" / ")
+}
+
+fn coverage(sums: &[Sum]) -> String {
+    sums.iter().map(|sum| percent(sum.coverage())).collect::<Vec<_>>().join(" / ")
+}
+
+/// The smoother beside the paper's method.
+fn tracks(seeds: &Range<u64>) -> String {
+    let columns = "outliers | dives | to reach, m | smoother, m | in its bands, % | wild fixes found, % | false alarms, % | \
+                   dives that warn | worst dive without a warning, m | paper's method, causal, m | improved, causal, m";
+    let row = |(row, target): (&Row, &str)| {
+        let judged = smoothed(row, seeds.clone());
+        [
+            row.name.to_owned(),
+            judged.dives.to_string(),
+            target.to_owned(),
+            errors(&judged.sums),
+            coverage(&judged.sums),
+            percent(judged.recall()),
+            percent(judged.false_alarms()),
+            judged.warned.to_string(),
+            short(judged.worst_unwarned_m),
+            errors(&followed(row, seeds.clone(), || paper(None))),
+            errors(&followed(row, seeds.clone(), improved)),
+        ]
+        .join(" | ")
+    };
+    table(columns, ROWS.iter().zip(TARGETS).map(row))
+}
+
+/// Predictions 20, 60 and 180 s ahead.
+fn predictions(seeds: &Range<u64>) -> String {
+    let columns = "outliers | paper's method, m | with a memory of 60 s, m | improved, m | in its bands, %";
+    let row = |row: &Row| {
+        let better = predicted(row, seeds.clone(), improved);
+        [
+            row.name.to_owned(),
+            errors(&predicted(row, seeds.clone(), || paper(None))),
+            errors(&predicted(row, seeds.clone(), || paper(Some(MEMORY_S)))),
+            errors(&better),
+            coverage(&better),
+        ]
+        .join(" | ")
+    };
+    table(columns, ROWS.iter().map(row))
+}
+
+fn main() -> Result<(), String> {
+    let arguments = Arguments::parse();
+    let [ours, fresh] = [1, 2001].map(|first| first..first + arguments.runs);
+    let tables = vec![
+        ("tracks".to_owned(), tracks(&ours)),
+        ("predictions".to_owned(), predictions(&ours)),
+        ("fresh tracks".to_owned(), tracks(&fresh)),
+    ];
+    if let Some(path) = &arguments.page {
+        let old = fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        return fs::write(path, page::filled(&old, &tables)?).map_err(|e| format!("{}: {e}", path.display()));
     }
-    for row in &ROWS[..4] {
-        let t = std::time::Instant::now();
-        let j = smoothed(row, first..runs + first);
-        println!(
-            "{:18} {:.2} / {:.2}  cov {:.1} / {:.1}  recall {:.2} fa {:.2} warned {} worst unwarned {:.1}  {:.1} ms/dive",
-            row.name, j.sums[0].rmse(), j.sums[1].rmse(), 100.0 * j.sums[0].coverage(), 100.0 * j.sums[1].coverage(),
-            100.0 * j.recall(), 100.0 * j.false_alarms(), j.warned, j.worst_unwarned_m, t.elapsed().as_secs_f64() * 1e3 / runs as f64
-        );
-        let mut seen: Vec<_> = j.each.iter().map(|e| e[0]).collect();
-        seen.sort_by(f64::total_cmp);
-        println!("    seen median {:.2} max {:.2?}", seen[seen.len() / 2], &seen[seen.len().saturating_sub(4)..]);
-    }
+    tables.iter().for_each(|(name, table)| println!("<!-- {name} -->\n\n{table}\n<!-- end {name} -->\n"));
+    Ok(())
 }

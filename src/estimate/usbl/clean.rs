@@ -113,7 +113,8 @@ pub fn clean(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Resul
     let mut judging = Judging::new(fixes, heights, settings);
     let usable: Vec<Sample> = judging.usable.iter().map(|&i| fixes[i]).collect();
     let times: Vec<f64> = usable.iter().map(|f| f.time_s).collect();
-    let gap_s = settings.exchange_gap_s.unwrap_or_else(|| cycles::exchange_gap_s(&times)).max(cycles::LEAST_GAP_S);
+    let gap_s =
+        settings.exchange_gap_s.unwrap_or_else(|| cycles::exchange_gap_s(&times)).max(cycles::LEAST_GAP_S);
     let groups = cycles::group(&times, gap_s);
     for (needed, got) in [(MIN_FIXES, usable.len()), (MIN_CYCLES, groups.len())] {
         if got < needed {
@@ -230,7 +231,12 @@ impl Fit {
         Err(EstimateError::Undetermined { what: "usbl".into(), why: "the fit didn't end" })
     }
 
-    fn track(&self, dive: &Dive, switches: &Switches, density: [Vec<f64>; 3]) -> Result<Wiener, EstimateError> {
+    fn track(
+        &self,
+        dive: &Dive,
+        switches: &Switches,
+        density: [Vec<f64>; 3],
+    ) -> Result<Wiener, EstimateError> {
         let mut knowledge = vec![[Knowledge::default(); 3]; dive.nodes_s.len()];
         for (e, exchange) in dive.exchanges.iter().enumerate() {
             let node = dive.node_of[e];
@@ -264,7 +270,8 @@ impl Fit {
                     let dt = fix.time_s - exchange.time_s;
                     let variance = fix.sigma[axis] * fix.sigma[axis];
                     let left = fix.value[axis] - p - dt * v;
-                    let share = (pp + 2.0 * dt * pv + dt * dt * vv) / (variance * self.scale[axis / 2].powi(2));
+                    let share =
+                        (pp + 2.0 * dt * pv + dt * dt * vv) / (variance * self.scale[axis / 2].powi(2));
                     squares[axis / 2] += left * left / variance;
                     freedom[axis / 2] += (1.0 - share).max(0.0);
                 }
@@ -275,7 +282,12 @@ impl Fit {
 }
 
 impl Dive {
-    fn new(fixes: Vec<Sample>, exchanges: Vec<Exchange>, candidates: Vec<Candidate>, heights: &[Height]) -> Self {
+    fn new(
+        fixes: Vec<Sample>,
+        exchanges: Vec<Exchange>,
+        candidates: Vec<Candidate>,
+        heights: &[Height],
+    ) -> Self {
         let mut sorted = heights.to_vec();
         sorted.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
         let centres: Vec<f64> = exchanges.iter().map(|e| e.time_s).collect();
@@ -362,7 +374,8 @@ impl Judging {
         for (e, exchange) in dive.exchanges.iter().enumerate() {
             for i in exchange.fixes.clone().filter(|&i| !switches.used[i]) {
                 let reason = if switches.believed[e] { Reason::OffByItself } else { Reason::OffAsCycle };
-                (self.judged[self.usable[i]].verdict, self.judged[self.usable[i]].reason) = (Verdict::Wild, reason);
+                (self.judged[self.usable[i]].verdict, self.judged[self.usable[i]].reason) =
+                    (Verdict::Wild, reason);
             }
         }
         // noise is that of the dive's fixes where there is one, which is what was stated times what was found
@@ -405,11 +418,17 @@ fn warnings(
     }
     for dispute in disputes {
         let [from_s, to_s] = [dispute.from, dispute.to].map(|e| dive.exchanges[e].time_s);
-        let sigma = |e: usize| track.at(dive.exchanges[e].time_s).position_sigma.iter().fold(0.0, |s: f64, v| s.max(*v));
+        let sigma = |e: usize| {
+            track.at(dive.exchanges[e].time_s).position_sigma.iter().fold(0.0, |s: f64, v| s.max(*v))
+        };
         let sigma = (dispute.from..=dispute.to).map(sigma).fold(0.0, f64::max);
         let odds = dispute.log_odds.exp();
-        let fix_sigma = dive.fixes[dive.exchanges[dispute.to].fixes.start].sigma.iter().fold(0.0, |s: f64, v| s.max(*v));
-        if odds > RIVAL_ODDS && dispute.apart_m > RIVAL_SIGMAS * sigma && dispute.apart_m > RIVAL_FIX_SIGMAS * fix_sigma {
+        let fix_sigma =
+            dive.fixes[dive.exchanges[dispute.to].fixes.start].sigma.iter().fold(0.0, |s: f64, v| s.max(*v));
+        if odds > RIVAL_ODDS
+            && dispute.apart_m > RIVAL_SIGMAS * sigma
+            && dispute.apart_m > RIVAL_FIX_SIGMAS * fix_sigma
+        {
             warnings.push(Warning::Ambiguous { from_s, to_s, apart_m: dispute.apart_m, odds });
         }
     }

@@ -45,8 +45,11 @@ pub fn exchange_gap_s(times_s: &[f64]) -> f64 {
             let contrast = ((total - below) / (n - count) - below / count).exp();
             let mean_size = n / (n - count);
             best = between;
-            valley =
-                if contrast >= LEAST_CONTRAST && mean_size <= MOST_MEAN { pair[0].midpoint(pair[1]).exp() } else { 0.0 };
+            valley = if contrast >= LEAST_CONTRAST && mean_size <= MOST_MEAN {
+                pair[0].midpoint(pair[1]).exp()
+            } else {
+                0.0
+            };
         }
     }
     valley
@@ -87,7 +90,11 @@ pub(super) fn first_noise_scale(fixes: &[Sample], groups: &[Range<usize>]) -> f6
     const CLEAR: f64 = 2.0;
     let pairs = groups.iter().flat_map(|group| fixes[group.clone()].windows(2));
     let square = |w: &[Sample]| {
-        (0..3).map(|a| (w[1].value[a] - w[0].value[a]).powi(2) / (w[0].sigma[a].powi(2) + w[1].sigma[a].powi(2))).sum()
+        (0..3)
+            .map(|a| {
+                (w[1].value[a] - w[0].value[a]).powi(2) / (w[0].sigma[a].powi(2) + w[1].sigma[a].powi(2))
+            })
+            .sum()
     };
     let mut squares: Vec<f64> = pairs.map(square).collect();
     if squares.len() < FEWEST {

@@ -61,8 +61,8 @@ pub fn position(seen: &Polar, ship: &Ship) -> ([f64; 3], [[f64; 3]; 3]) {
     let [range, bearing, depression] = seen.sigma;
     let variances = Vector3::new(range, bearing.hypot(ship.heading_sigma_rad), depression).map(|s| s * s);
     let own = Vector3::from(ship.position_sigma_m).map(|s| s * s);
-    let covariance = jacobian * Matrix3::from_diagonal(&variances) * jacobian.transpose()
-        + Matrix3::from_diagonal(&own); // (2)
+    let covariance =
+        jacobian * Matrix3::from_diagonal(&variances) * jacobian.transpose() + Matrix3::from_diagonal(&own); // (2)
     (position.into(), covariance.into())
 }
 
@@ -101,7 +101,12 @@ mod tests {
     use super::*;
 
     fn ship(heading_rad: f64) -> Ship {
-        Ship { position: [10.0, 20.0, -5.0], heading_rad, position_sigma_m: [0.5; 3], heading_sigma_rad: 0.004 }
+        Ship {
+            position: [10.0, 20.0, -5.0],
+            heading_rad,
+            position_sigma_m: [0.5; 3],
+            heading_sigma_rad: 0.004,
+        }
     }
 
     fn polar(range_m: f64, bearing_rad: f64, depression_rad: f64) -> Polar {
@@ -110,7 +115,8 @@ mod tests {
 
     #[test]
     fn plain_directions_are_where_a_sailor_expects_them() {
-        let at = |bearing, depression, heading| position(&polar(100.0, bearing, depression), &ship(heading)).0;
+        let at =
+            |bearing, depression, heading| position(&polar(100.0, bearing, depression), &ship(heading)).0;
         let near = |found: [f64; 3], expected: [f64; 3]| {
             assert!(found.iter().zip(expected).all(|(f, e)| (f - e).abs() < 1e-12), "{found:?} {expected:?}");
         };
@@ -145,7 +151,10 @@ mod tests {
         for i in 0..3 {
             for j in 0..3 {
                 let scale = (covariance[i][i] * covariance[j][j]).sqrt();
-                assert!((sum[(i, j)] - covariance[i][j]).abs() < 0.03 * scale, "{i} {j}: {sum} {covariance:?}");
+                assert!(
+                    (sum[(i, j)] - covariance[i][j]).abs() < 0.03 * scale,
+                    "{i} {j}: {sum} {covariance:?}"
+                );
             }
         }
     }

@@ -81,7 +81,12 @@ struct Choice {
 }
 
 /// The likeliest history of all.
-pub(super) fn search(exchanges: &[Exchange], candidates: &[Candidate], wild: WildShares, motion: Motion) -> Found {
+pub(super) fn search(
+    exchanges: &[Exchange],
+    candidates: &[Candidate],
+    wild: WildShares,
+    motion: Motion,
+) -> Found {
     let mut beam = Beam::new(wild, motion);
     exchanges.iter().for_each(|exchange| beam.step(exchange, candidates));
     beam.found()
@@ -285,13 +290,20 @@ fn dispute(mut a: u32, mut b: u32, log_odds: f64, steps: &[Step], firsts: &[usiz
 
 impl History {
     /// One that believes `first` and nothing before.
-    fn start(first: &Candidate, time_s: f64, early: &[(f64, Candidate)], wild: WildShares, motion: Motion) -> Self {
+    fn start(
+        first: &Candidate,
+        time_s: f64,
+        early: &[(f64, Candidate)],
+        wild: WildShares,
+        motion: Motion,
+    ) -> Self {
         let speed = 0.5 * motion.speed_limit_m_s;
         let mut score = (1.0 - wild.cycle).ln() + first.log_inside;
         for (other_s, other) in early {
             let far = motion.speed_limit_m_s * (time_s - other_s);
             let usual = least_wild_m2(other.variance) + far * far;
-            score += wild.cycle.ln() + other.log_inside + log_off(square(minus(other.mean, first.mean)), usual);
+            score +=
+                wild.cycle.ln() + other.log_inside + log_off(square(minus(other.mean, first.mean)), usual);
         }
         Self {
             state: first.mean.map(|p| [p, 0.0]),
@@ -354,7 +366,8 @@ impl History {
     fn limit(&mut self, limit_m_s: f64) {
         let speed = square(self.state.map(|s| s[1])).sqrt();
         let excess = (speed - limit_m_s).max(0.0);
-        let variance = self.covariance.iter().map(|c| c[2]).fold(0.0, f64::max) + 0.01 * limit_m_s * limit_m_s;
+        let variance =
+            self.covariance.iter().map(|c| c[2]).fold(0.0, f64::max) + 0.01 * limit_m_s * limit_m_s;
         self.score -= 0.5 * excess * excess / variance;
     }
 

@@ -21,14 +21,21 @@ struct Without {
 
 impl Without {
     /// `None` where nothing else tells.
-    fn new(dive: &Dive, switches: &Switches, track: &Wiener, scale: [f64; 2], exchange: usize) -> Option<Self> {
+    fn new(
+        dive: &Dive,
+        switches: &Switches,
+        track: &Wiener,
+        scale: [f64; 2],
+        exchange: usize,
+    ) -> Option<Self> {
         let (mut state, mut covariance) = ([[0.0; 2]; 3], [[0.0; 3]; 3]);
         let own = &dive.exchanges[exchange];
         for axis in 0..3 {
             let ([p, v], [pp, pv, vv]) = track.node(axis, dive.node_of[exchange]);
             let determinant = pp * vv - pv * pv;
             let mut information = [vv / determinant, -pv / determinant, pp / determinant];
-            let mut right = [information[0] * p + information[1] * v, information[1] * p + information[2] * v];
+            let mut right =
+                [information[0] * p + information[1] * v, information[1] * p + information[2] * v];
             for i in own.fixes.clone().filter(|&i| switches.used[i]) {
                 let fix = &dive.fixes[i];
                 let dt = fix.time_s - own.time_s;
@@ -63,11 +70,8 @@ impl Without {
 impl Switches {
     /// Those of the candidates that are chosen, one an exchange or none.
     pub(super) fn new(dive: &Dive, chosen: &[Option<usize>], wild: WildShares) -> Self {
-        let mut switches = Self {
-            believed: vec![false; dive.exchanges.len()],
-            used: vec![false; dive.fixes.len()],
-            wild,
-        };
+        let mut switches =
+            Self { believed: vec![false; dive.exchanges.len()], used: vec![false; dive.fixes.len()], wild };
         for (e, candidate) in chosen.iter().enumerate() {
             switches.choose(dive, e, *candidate);
         }
@@ -108,7 +112,9 @@ impl Switches {
             let likeliest = &dive.candidates[exchange.candidates.start];
             let (position, variance) = without.at(likeliest.time_s - exchange.time_s);
             let usual = least_wild_m2(likeliest.variance) + variance.iter().sum::<f64>();
-            let off = wild.cycle.ln() + likeliest.log_inside + log_off(square(minus(likeliest.mean, position)), usual);
+            let off = wild.cycle.ln()
+                + likeliest.log_inside
+                + log_off(square(minus(likeliest.mean, position)), usual);
             let mut best = (None, off);
             for c in exchange.candidates.clone() {
                 let candidate = &dive.candidates[c];

@@ -74,7 +74,8 @@ fn the_smoother_equals_dense_batch_least_squares_at_irregular_times() {
     }
     let inverse = gram.try_inverse().expect("regular");
     let expected = &inverse * right;
-    let track = Wiener::fit(&times, &knowledge, [0, 1, 2].map(|_| density.to_vec()), 1.2).expect("determined");
+    let track =
+        Wiener::fit(&times, &knowledge, [0, 1, 2].map(|_| density.to_vec()), 1.2).expect("determined");
     for k in 0..times.len() {
         let ([p, v], [pp, pv, vv]) = track.node(1, k);
         for (found, dense) in [
@@ -95,7 +96,8 @@ fn the_smoother_equals_dense_batch_least_squares_at_irregular_times() {
     let densities = [0, 1, 2].map(|_| [&density[..4], &density[3..]].concat());
     let with = Wiener::fit(&more, &knowledge, densities, 1.2).expect("determined");
     let ([p, v], [pp, _, vv]) = with.node(2, 4);
-    let found = [between.position[2], between.velocity[2], between.position_sigma[2], between.velocity_sigma[2]];
+    let found =
+        [between.position[2], between.velocity[2], between.position_sigma[2], between.velocity_sigma[2]];
     for (found, expected) in found.iter().zip([p, v, pp.sqrt(), vv.sqrt()]) {
         assert!((found - expected).abs() < 1e-6 * expected.abs().max(1.0), "{found} {expected}");
     }
@@ -113,7 +115,8 @@ fn a_wild_start_and_wild_exchanges_are_thrown_out_and_good_fixes_kept() {
             assert!(judged.residual_sigmas > 5.0, "{judged:?}");
         }
     }
-    let lost = track.judged.iter().enumerate().filter(|(n, j)| !wild(n / 4) && j.verdict != Verdict::Kept).count();
+    let lost =
+        track.judged.iter().enumerate().filter(|(n, j)| !wild(n / 4) && j.verdict != Verdict::Kept).count();
     assert!(lost <= 4, "{lost}");
     assert!(track.warnings.is_empty(), "{:?}", track.warnings);
 }
@@ -162,7 +165,10 @@ fn a_depth_sensor_throws_out_what_has_another_height_and_carries_the_height_thro
     let track = clean(&heard, &heights, &Settings::default()).expect("a track");
     assert!(track.judged.iter().any(|j| j.reason == Reason::OffDepth));
     let middle = track.at(950.0).expect("a state");
-    assert!((middle.position[2] - truth(950.0)[2]).abs() < 1.0 && middle.position_sigma[2] < 1.0, "{middle:?}");
+    assert!(
+        (middle.position[2] - truth(950.0)[2]).abs() < 1.0 && middle.position_sigma[2] < 1.0,
+        "{middle:?}"
+    );
     assert!(middle.position_sigma[0] > 3.0, "{middle:?}");
 }
 
@@ -205,12 +211,20 @@ fn data_that_cannot_carry_a_track_are_told_by_an_error_or_a_warning() {
     assert!(clean(&[], &[], &Settings::default()).is_err());
     // half of the exchanges are elsewhere, and agree with each other
     let split = cleaned(&fixes(|i, _| if i % 2 == 0 { [0.0; 3] } else { [80.0, 0.0, 0.0] }));
-    assert!(split.warnings.iter().any(|w| matches!(w, Warning::ManyWildCycles { .. })), "{:?}", split.warnings);
+    assert!(
+        split.warnings.iter().any(|w| matches!(w, Warning::ManyWildCycles { .. })),
+        "{:?}",
+        split.warnings
+    );
     // nothing agrees with anything
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut noise = || -> f64 { StandardNormal.sample(&mut rng) };
     let chaos: Vec<Sample> = (0..200)
-        .map(|i| Sample { time_s: 20.0 * f64::from(i), value: [0; 3].map(|_| 400.0 * noise()), sigma: [3.0; 3] })
+        .map(|i| Sample {
+            time_s: 20.0 * f64::from(i),
+            value: [0; 3].map(|_| 400.0 * noise()),
+            sigma: [3.0; 3],
+        })
         .collect();
     assert!(clean(&chaos, &[], &Settings::default()).map_or(true, |track| !track.warnings.is_empty()));
 }
@@ -218,7 +232,11 @@ fn data_that_cannot_carry_a_track_are_told_by_an_error_or_a_warning() {
 #[test]
 fn many_fixes_at_one_instant_are_no_trouble() {
     let mut given = fixes(|_, _| [0.0; 3]);
-    given.extend((0..50).map(|k| Sample { time_s: 400.0, value: truth(400.0).map(|v| v + f64::from(k % 5)), sigma: [3.0; 3] }));
+    given.extend((0..50).map(|k| Sample {
+        time_s: 400.0,
+        value: truth(400.0).map(|v| v + f64::from(k % 5)),
+        sigma: [3.0; 3],
+    }));
     let state = cleaned(&given).at(400.0).expect("a state");
     assert!((0..3).all(|a| (state.position[a] - truth(400.0)[a]).abs() < 5.0 && state.position_sigma[a].is_finite()));
 }

@@ -85,7 +85,8 @@ impl Wiener {
         density: [Vec<f64>; 3],
         speed_m_s: f64,
     ) -> Result<Self, EstimateError> {
-        let open = EstimateError::Undetermined { what: "usbl".into(), why: "too few fixes agree with each other" };
+        let open =
+            EstimateError::Undetermined { what: "usbl".into(), why: "too few fixes agree with each other" };
         let [x_density, y_density, z_density] = density;
         let alike = x_density == y_density && knowledge.iter().all(|[x, y, _]| x.gram == y.gram);
         let of = |axis: usize| knowledge.iter().map(move |k| &k[axis]);
@@ -101,7 +102,10 @@ impl Wiener {
     pub(super) fn node(&self, axis: usize, k: usize) -> ([f64; 2], [f64; 3]) {
         let Axis { states, covariance, .. } = &self.axes[axis];
         let i = 2 * k;
-        ([states[i][0], states[i + 1][0]], [covariance.get(i, i), covariance.get(i, i + 1), covariance.get(i + 1, i + 1)])
+        (
+            [states[i][0], states[i + 1][0]],
+            [covariance.get(i, i), covariance.get(i, i + 1), covariance.get(i + 1, i + 1)],
+        )
     }
 
     /// q by interval.
@@ -159,8 +163,12 @@ impl Wiener {
             s * s * (3.0 - 2.0 * s),
             -a * s * (1.0 - s),
         ];
-        let velocity =
-            [-6.0 * s * (1.0 - s) / gap, (1.0 - s) * (1.0 - 3.0 * s), 6.0 * s * (1.0 - s) / gap, s * (3.0 * s - 2.0)];
+        let velocity = [
+            -6.0 * s * (1.0 - s) / gap,
+            (1.0 - s) * (1.0 - 3.0 * s),
+            6.0 * s * (1.0 - s) / gap,
+            s * (3.0 * s - 2.0),
+        ];
         let bend = [
             (12.0 * s - 6.0) / (gap * gap),
             (6.0 * s - 4.0) / gap,

@@ -131,7 +131,8 @@ mod tests {
         let [from, to] = record.silence_s.expect("one");
         assert!((to - from - 240.0).abs() < 1e-9);
         assert!(record.fixes.iter().all(|f| f.sample.time_s <= from || f.sample.time_s >= to));
-        let (wild, good): (Vec<SimulatedFix>, Vec<SimulatedFix>) = record.fixes.iter().copied().partition(|f| f.wild);
+        let (wild, good): (Vec<SimulatedFix>, Vec<SimulatedFix>) =
+            record.fixes.iter().copied().partition(|f| f.wild);
         let share = wild.len() as f64 / record.fixes.len() as f64;
         assert!((share - 0.3).abs() < 0.05, "{share}");
         let squares: f64 = good

@@ -62,7 +62,12 @@ impl Improved {
             let motion = Motion { density: [density * limit * limit; 3], speed_limit_m_s: limit };
             (Beam::new(WILD, motion), 0.0)
         };
-        Self { settings, open: Open::default(), beams: DENSITIES.into_iter().map(beam).collect(), exchanges: 0 }
+        Self {
+            settings,
+            open: Open::default(),
+            beams: DENSITIES.into_iter().map(beam).collect(),
+            exchanges: 0,
+        }
     }
 
     fn close(&mut self, fixes: &[Sample]) {

@@ -21,7 +21,10 @@ mod tests {
         let points = [3.0, 21.7, 60.2].map(|t| (t, at(t)));
         for t in [-10.0, 3.0, 40.0, 60.2, 75.0] {
             for (found, expected) in quadratic(&points, t).iter().zip(at(t)) {
-                assert!((found - expected).abs() < 1e-10 * expected.abs().max(1.0), "{t}: {found} {expected}");
+                assert!(
+                    (found - expected).abs() < 1e-10 * expected.abs().max(1.0),
+                    "{t}: {found} {expected}"
+                );
             }
         }
     }

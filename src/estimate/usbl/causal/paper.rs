@@ -41,7 +41,14 @@ impl Paper {
     /// Before the first fix.
     #[must_use]
     pub fn new(settings: PaperSettings) -> Self {
-        Self { settings, open: Open::default(), last: Vec::new(), first: Vec::new(), begin_s: None, rls: None }
+        Self {
+            settings,
+            open: Open::default(),
+            last: Vec::new(),
+            first: Vec::new(),
+            begin_s: None,
+            rls: None,
+        }
     }
 
     /// An exchange is over: aligns it to the cycle and takes it in.
@@ -96,7 +103,13 @@ impl Predictor for Paper {
     fn at(&self, time_s: f64) -> Option<State> {
         let (position, velocity) = self.rls.as_ref()?.at(time_s);
         let unknown = [f64::NAN; 3];
-        Some(State { position, velocity, acceleration: None, position_sigma: unknown, velocity_sigma: unknown })
+        Some(State {
+            position,
+            velocity,
+            acceleration: None,
+            position_sigma: unknown,
+            velocity_sigma: unknown,
+        })
     }
 }
 

@@ -131,7 +131,9 @@ mod tests {
         moved.count_from(70.0);
         let (here, there) = (rls.at(120.0), moved.at(120.0));
         for axis in 0..3 {
-            assert!((here.0[axis] - there.0[axis]).abs() < 1e-9 && (here.1[axis] - there.1[axis]).abs() < 1e-10);
+            assert!(
+                (here.0[axis] - there.0[axis]).abs() < 1e-9 && (here.1[axis] - there.1[axis]).abs() < 1e-10
+            );
         }
         assert!((rls.variance(120.0)[0] / moved.variance(120.0)[0] - 1.0).abs() < 1e-9);
     }
