@@ -51,8 +51,15 @@ const FIRST_STEPS: usize = 4;
 /// Steps with a liveliness that changes in time.
 const LIVELY_STEPS: usize = 5;
 
+/// Those of them after which whole exchanges are looked at once more.
+const LIVELY_REVISED: std::ops::Range<usize> = 1..3;
+
 /// Of more exchanges thrown out than this share nobody can say that the others are right.
 const MANY_WILD: f64 = 0.35;
+
+/// Of so many exchanges in a row no more than so many may be thrown out: with three in ten wild by chance it happens in one
+/// dive of twelve.
+const STRETCHES: [(usize, usize); 2] = [(6, 5), (12, 7)];
 
 /// Another track is worth a warning when it is this likely beside ours, and so many metres and sigmas off.
 const RIVAL_ODDS: f64 = 0.05;
@@ -179,10 +186,14 @@ pub fn clean(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Resul
         track = fit.settle(&dive, &switches, 1)?;
     }
     // a liveliness that changes in time, and fixes one by one
-    for _ in 0..LIVELY_STEPS {
-        let densities = liveliness::densities(&track, &dive.nodes_s, fit.density);
+    for step in 0..LIVELY_STEPS {
+        let densities = liveliness::densities(&track, &dive.nodes_s, &switches.heard(&dive), fit.density);
         track = fit.track(&dive, &switches, densities)?;
-        switches.revise_fixes(&dive, &track, fit.scale);
+        if LIVELY_REVISED.contains(&step) {
+            switches.revise(&dive, &track, fit.scale);
+        } else {
+            switches.revise_fixes(&dive, &track, fit.scale);
+        }
         fit.noise(&dive, &switches, &track);
     }
     let scale = [scale[0] * fit.scale[0], scale[1] * fit.scale[1]];
@@ -404,6 +415,31 @@ impl Judging {
     }
 }
 
+/// Where hardly any exchange is believed.
+fn wild_stretches(dive: &Dive, switches: &Switches) -> Vec<Warning> {
+    let wild: Vec<bool> = switches.believed.iter().map(|b| !b).collect();
+    let mut within = vec![false; wild.len()];
+    for (length, most) in STRETCHES {
+        for (begin, window) in wild.windows(length).enumerate() {
+            if window.iter().filter(|w| **w).count() > most {
+                within[begin..begin + length].fill(true);
+            }
+        }
+    }
+    let mut stretches = Vec::new();
+    let mut at = 0;
+    for run in within.chunk_by(|a, b| a == b) {
+        let of = run.len();
+        if run[0] {
+            let [from_s, to_s] = [at, at + of - 1].map(|e| dive.exchanges[e].time_s);
+            let rejected = wild[at..at + of].iter().filter(|w| **w).count();
+            stretches.push(Warning::WildStretch { from_s, to_s, rejected, of });
+        }
+        at += of;
+    }
+    stretches
+}
+
 fn warnings(
     dive: &Dive,
     switches: &Switches,
@@ -416,6 +452,7 @@ fn warnings(
     if rejected as f64 > MANY_WILD * of as f64 {
         warnings.push(Warning::ManyWildCycles { rejected, of });
     }
+    warnings.extend(wild_stretches(dive, switches));
     for dispute in disputes {
         let [from_s, to_s] = [dispute.from, dispute.to].map(|e| dive.exchanges[e].time_s);
         let sigma = |e: usize| {

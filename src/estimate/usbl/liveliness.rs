@@ -29,7 +29,7 @@ const SILENCE_PRIOR_S: f64 = 300.0;
 const UNSURE: f64 = 1.35;
 
 /// An interval is a silence that is this many times the usual one.
-const SILENCE: f64 = 2.5;
+const SILENCE: f64 = 4.5;
 
 /// What the density has to be multiplied by: horizontal, vertical.
 pub(super) fn factors(track: &Wiener) -> [f64; 2] {
@@ -44,8 +44,9 @@ pub(super) fn factors(track: &Wiener) -> [f64; 2] {
 }
 
 /// The next densities by axis and interval, `overall` being that of the whole dive.
-pub(super) fn densities(track: &Wiener, nodes_s: &[f64], overall: [f64; 2]) -> [Vec<f64>; 3] {
+pub(super) fn densities(track: &Wiener, nodes_s: &[f64], heard: &[bool], overall: [f64; 2]) -> [Vec<f64>; 3] {
     let usual_s = super::wiener::usual_gap_s(nodes_s);
+    let silent = silences(nodes_s, heard, SILENCE * usual_s);
     let [horizontal, vertical] = [(0..2, 0), (2..3, 1)].map(|(axes, which)| {
         let now = track.density(axes.start);
         // sums of d^2 and g up to each interval
@@ -59,13 +60,19 @@ pub(super) fn densities(track: &Wiener, nodes_s: &[f64], overall: [f64; 2]) -> [
         for k in 1..sums.len() {
             (0..2).for_each(|j| sums[k][j] += sums[k - 1][j]);
         }
-        local(&sums, now, nodes_s, overall[which], usual_s)
+        local(&sums, now, nodes_s, &silent, overall[which], usual_s)
     });
     [horizontal.clone(), horizontal, vertical]
 }
 
-fn local(sums: &[[f64; 2]], now: &[f64], nodes_s: &[f64], overall: f64, usual_s: f64) -> Vec<f64> {
-    let silent = |k: usize| nodes_s[k + 1] - nodes_s[k] > SILENCE * usual_s;
+fn local(
+    sums: &[[f64; 2]],
+    now: &[f64],
+    nodes_s: &[f64],
+    silent: &[bool],
+    overall: f64,
+    usual_s: f64,
+) -> Vec<f64> {
     let mut found: Vec<f64> = (0..now.len())
         .map(|k| {
             let middle = nodes_s[k].midpoint(nodes_s[k + 1]);
@@ -80,10 +87,10 @@ fn local(sums: &[[f64; 2]], now: &[f64], nodes_s: &[f64], overall: f64, usual_s:
     let mut energy = vec![[0.0; 2]];
     for k in 0..now.len() {
         let last = energy[k];
-        let heard_s = if silent(k) { 0.0 } else { nodes_s[k + 1] - nodes_s[k] };
+        let heard_s = if silent[k] { 0.0 } else { nodes_s[k + 1] - nodes_s[k] };
         energy.push([last[0] + heard_s * found[k], last[1] + heard_s]);
     }
-    for k in (0..now.len()).filter(|&k| silent(k)) {
+    for k in (0..now.len()).filter(|&k| silent[k]) {
         let middle = nodes_s[k].midpoint(nodes_s[k + 1]);
         let reach = HALF_SILENCE_S + 0.5 * (nodes_s[k + 1] - nodes_s[k]);
         let (from, to) = window(nodes_s, middle, reach);
@@ -91,6 +98,19 @@ fn local(sums: &[[f64; 2]], now: &[f64], nodes_s: &[f64], overall: f64, usual_s:
         found[k] = UNSURE * (sum + SILENCE_PRIOR_S * overall) / (heard_s + SILENCE_PRIOR_S);
     }
     found
+}
+
+/// The intervals that lie between two nodes at which something was heard that are farther apart than `longest_s`.
+fn silences(nodes_s: &[f64], heard: &[bool], longest_s: f64) -> Vec<bool> {
+    let mut silent = vec![false; nodes_s.len() - 1];
+    let mut last = 0;
+    for k in 1..nodes_s.len() {
+        if heard[k] || k + 1 == nodes_s.len() {
+            silent[last..k].fill(nodes_s[k] - nodes_s[last] > longest_s);
+            last = k;
+        }
+    }
+    silent
 }
 
 /// The nodes within `half_s` of an instant: first and last.

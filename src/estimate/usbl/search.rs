@@ -163,7 +163,7 @@ impl Beam {
         for rival in &self.histories[1..] {
             let log_odds = rival.score - best.score;
             if log_odds > -RIVAL {
-                found.disputes.extend(dispute(best.past, rival.past, log_odds, &self.steps, &self.firsts));
+                found.disputes.push(dispute(best.past, rival.past, log_odds, &self.steps, &self.firsts));
             }
         }
         found
@@ -252,7 +252,7 @@ fn trace(best: &History, steps: &[Step], firsts: &[usize]) -> Found {
         let exchange = exchange_of(at, firsts);
         chosen[exchange] = (step.candidate != NONE).then_some(step.candidate as usize);
         if step.rival != NONE {
-            disputes.extend(dispute(at, step.rival, f64::from(step.rival_log_odds), steps, firsts));
+            disputes.push(dispute(at, step.rival, f64::from(step.rival_log_odds), steps, firsts));
         }
         at = step.past;
     }
@@ -264,7 +264,7 @@ fn exchange_of(step: u32, firsts: &[usize]) -> usize {
 }
 
 /// Where two histories part, and how far they are apart.
-fn dispute(mut a: u32, mut b: u32, log_odds: f64, steps: &[Step], firsts: &[usize]) -> Option<Dispute> {
+fn dispute(mut a: u32, mut b: u32, log_odds: f64, steps: &[Step], firsts: &[usize]) -> Dispute {
     let to = exchange_of(a, firsts);
     let mut found = Dispute { from: to, to, apart_m: 0.0, log_odds };
     for _ in 0..LONGEST_DISPUTE {
@@ -285,7 +285,7 @@ fn dispute(mut a: u32, mut b: u32, log_odds: f64, steps: &[Step], firsts: &[usiz
             b = step_b.past;
         }
     }
-    Some(found)
+    found
 }
 
 impl History {

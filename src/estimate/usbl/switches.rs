@@ -91,6 +91,13 @@ impl Switches {
         changed
     }
 
+    /// By node: whether something is believed there.
+    pub(super) fn heard(&self, dive: &Dive) -> Vec<bool> {
+        let mut heard = vec![false; dive.nodes_s.len()];
+        dive.node_of.iter().zip(&self.believed).for_each(|(&node, &believed)| heard[node] = believed);
+        heard
+    }
+
     /// Shares of what is wild, with a prior worth so many fixes or exchanges.
     pub(super) fn shares(&self, prior: WildShares, worth: f64) -> WildShares {
         let cycles = self.believed.len() as f64;

@@ -86,6 +86,21 @@ pub enum Warning {
         /// Of how many.
         of: usize,
     },
+    /// For a while hardly any exchange was believed: those that were may be the wrong ones.
+    #[error(
+        "from {from_s:.0} s to {to_s:.0} s {rejected} of {of} exchanges were thrown out: the track may be wrong there by more \
+         than its bands"
+    )]
+    WildStretch {
+        /// Where it begins, s.
+        from_s: f64,
+        /// Where it ends, s.
+        to_s: f64,
+        /// How many were thrown out.
+        rejected: usize,
+        /// Of how many.
+        of: usize,
+    },
     /// Another track explains the fixes nearly as well.
     #[error(
         "from {from_s:.0} s to {to_s:.0} s the fixes allow another track, up to {apart_m:.0} m off (odds {odds:.2})"

@@ -94,6 +94,7 @@ fn either_side(range: [f64; 2], rng: &mut impl Rng) -> f64 {
 }
 
 /// What is steered for a while: speed ahead, rate of turn, speed upwards.
+#[expect(clippy::struct_field_names, reason = "units stand in names")]
 struct Order {
     until_s: f64,
     ahead_m_s: f64,
