@@ -87,7 +87,7 @@ fn clean_usbl(c: &mut Criterion) {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let fix = |i: usize| {
             let time_s = 20.0 * (i / 4) as f64 + 0.5 * (i % 4) as f64;
-            let off = if i / 4 % 10 == 0 || i.is_multiple_of(11) { 60.0 } else { 0.0 };
+            let off = if (i / 4).is_multiple_of(10) || i.is_multiple_of(11) { 60.0 } else { 0.0 };
             let value = std::array::from_fn(|axis| {
                 let noise: f64 = StandardNormal.sample(&mut rng);
                 300.0 * (time_s / 500.0 + axis as f64).sin() + 3.0 * noise + off

@@ -108,7 +108,7 @@ fn predictions(seeds: &Range<u64>) -> String {
 
 fn main() -> Result<(), String> {
     let arguments = Arguments::parse();
-    let [ours, fresh] = [1, 2001].map(|first| first..first + arguments.runs);
+    let [ours, fresh] = [1, 3001].map(|first| first..first + arguments.runs);
     let tables = vec![
         ("tracks".to_owned(), tracks(&ours)),
         ("predictions".to_owned(), predictions(&ours)),

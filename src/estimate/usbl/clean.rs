@@ -1,11 +1,14 @@
 //! The robust smoother, from fixes to a track, a verdict for each, and warnings.
 
 use super::candidates::{Candidate, Exchange, WildShares, exchanges};
-use super::search::{Dispute, Motion, search};
+use super::dive::Dive;
+use super::judging::Judging;
+use super::search::{Motion, search};
 use super::switches::Switches;
-use super::verdict::{Judged, Reason, Verdict, Warning};
+use super::verdict::{Judged, Warning};
+use super::warnings::warnings;
 use super::wiener::{Knowledge, Wiener};
-use super::{Height, cycles, in_order, liveliness};
+use super::{Height, cycles, liveliness};
 use crate::estimate::{EstimateError, check};
 use crate::sample::{Sample, Source};
 use crate::track::{Curve, State};
@@ -54,21 +57,6 @@ const LIVELY_STEPS: usize = 5;
 /// Those of them after which whole exchanges are looked at once more.
 const LIVELY_REVISED: std::ops::Range<usize> = 1..3;
 
-/// Of more exchanges thrown out than this share nobody can say that the others are right.
-const MANY_WILD: f64 = 0.35;
-
-/// Of so many exchanges in a row no more than so many may be thrown out: with three in ten wild by chance it happens in one
-/// dive of twelve.
-const STRETCHES: [(usize, usize); 2] = [(6, 5), (12, 7)];
-
-/// Another track is worth a warning when it is this likely beside ours, and so many metres and sigmas off.
-const RIVAL_ODDS: f64 = 0.05;
-const RIVAL_SIGMAS: f64 = 3.0;
-const RIVAL_FIX_SIGMAS: f64 = 5.0;
-
-/// A noise that differs by this factor from what was stated is worth a warning.
-const NOISE_FACTOR: f64 = 1.5;
-
 /// A dive, cleaned.
 #[derive(Clone, Debug)]
 pub struct Cleaned {
@@ -92,19 +80,6 @@ impl Curve for Cleaned {
     fn at(&self, time_s: f64) -> Option<State> {
         time_s.is_finite().then(|| self.track.at(time_s))
     }
-}
-
-/// The dive on which a track is fitted: fixes in order of time, without those that are out from the beginning.
-pub(super) struct Dive {
-    pub(super) fixes: Vec<Sample>,
-    pub(super) exchanges: Vec<Exchange>,
-    pub(super) candidates: Vec<Candidate>,
-    /// Times of the nodes, s: the exchanges, and in long gaps some more where a height is known.
-    pub(super) nodes_s: Vec<f64>,
-    /// The node of each exchange.
-    pub(super) node_of: Vec<usize>,
-    /// What the depth sensor says at the nodes.
-    heights: Vec<Option<(f64, f64)>>,
 }
 
 /// Cleans a dive: a track, and a verdict for every fix.
@@ -290,190 +265,4 @@ impl Fit {
         }
         self.scale = [0, 1].map(|i| (squares[i] / freedom[i]).sqrt().max(1e-3));
     }
-}
-
-impl Dive {
-    fn new(
-        fixes: Vec<Sample>,
-        exchanges: Vec<Exchange>,
-        candidates: Vec<Candidate>,
-        heights: &[Height],
-    ) -> Self {
-        let mut sorted = heights.to_vec();
-        sorted.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
-        let centres: Vec<f64> = exchanges.iter().map(|e| e.time_s).collect();
-        let usual_s = cycles::cycle_time_s(&centres).unwrap_or(1.0);
-        let (mut nodes_s, mut node_of): (Vec<f64>, Vec<usize>) = (Vec::new(), Vec::new());
-        for time_s in centres {
-            if let Some(&last) = nodes_s.last() {
-                let between = ((time_s - last) / usual_s) as usize;
-                for k in 1..between {
-                    let t = last + (time_s - last) * k as f64 / between as f64;
-                    if height_at(&sorted, t).is_some() {
-                        nodes_s.push(t);
-                    }
-                }
-            }
-            let after = nodes_s.last().map_or(f64::NEG_INFINITY, |last| last + 0.05 * cycles::LEAST_GAP_S);
-            node_of.push(nodes_s.len());
-            nodes_s.push(time_s.max(after));
-        }
-        let heights = nodes_s.iter().map(|&t| height_at(&sorted, t)).collect();
-        Self { fixes, exchanges, candidates, nodes_s, node_of, heights }
-    }
-}
-
-/// What the depth sensor says at an instant: height and its sigma, between two samples that are close.
-fn height_at(sorted: &[Height], time_s: f64) -> Option<(f64, f64)> {
-    /// The vehicle sinks evenly for so long.
-    const CLOSE_S: f64 = 10.0;
-    let after = sorted.partition_point(|h| h.time_s < time_s);
-    let next = sorted.get(after)?;
-    let last = if next.time_s <= time_s { next } else { sorted.get(after.checked_sub(1)?)? };
-    let gap_s = next.time_s - last.time_s;
-    let share = if gap_s > 0.0 { (time_s - last.time_s) / gap_s } else { 0.0 };
-    (gap_s <= CLOSE_S).then(|| (last.z_m + share * (next.z_m - last.z_m), last.sigma_m.max(next.sigma_m)))
-}
-
-/// The verdicts while they are made.
-struct Judging {
-    judged: Vec<Judged>,
-    /// Indices of the fixes that are neither repeated nor off in depth, in order of time.
-    usable: Vec<usize>,
-    fixes: Vec<Sample>,
-}
-
-impl Judging {
-    fn new(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Self {
-        let mut sorted = heights.to_vec();
-        sorted.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
-        let unjudged = Judged {
-            verdict: Verdict::Kept,
-            reason: Reason::Fits,
-            late: false,
-            cycle: 0,
-            residual_m: [0.0; 3],
-            residual_sigmas: 0.0,
-        };
-        let mut judged = vec![unjudged; fixes.len()];
-        let mut newest = f64::NEG_INFINITY;
-        for (fix, judged) in fixes.iter().zip(&mut judged) {
-            judged.late = fix.time_s < newest;
-            newest = newest.max(fix.time_s);
-        }
-        let mut usable: Vec<usize> = Vec::with_capacity(fixes.len());
-        for i in in_order(fixes) {
-            let fix = &fixes[i];
-            let same_time = usable.iter().rev().take_while(|&&j| fixes[j].time_s >= fix.time_s);
-            if same_time.take(cycles::MOST_FIXES).any(|&j| fixes[j].value == fix.value) {
-                (judged[i].verdict, judged[i].reason) = (Verdict::Duplicate, Reason::Repeated);
-                continue;
-            }
-            let off = height_at(&sorted, fix.time_s).is_some_and(|(z_m, sigma_m)| {
-                (fix.value[2] - z_m).abs() > settings.depth_gate_sigmas * fix.sigma[2].hypot(sigma_m)
-            });
-            if off {
-                (judged[i].verdict, judged[i].reason) = (Verdict::Wild, Reason::OffDepth);
-                continue;
-            }
-            usable.push(i);
-        }
-        Self { judged, usable, fixes: fixes.to_vec() }
-    }
-
-    fn judge(&mut self, dive: &Dive, switches: &Switches, track: &Wiener, scale: [f64; 2]) {
-        for (e, exchange) in dive.exchanges.iter().enumerate() {
-            for i in exchange.fixes.clone().filter(|&i| !switches.used[i]) {
-                let reason = if switches.believed[e] { Reason::OffByItself } else { Reason::OffAsCycle };
-                (self.judged[self.usable[i]].verdict, self.judged[self.usable[i]].reason) =
-                    (Verdict::Wild, reason);
-            }
-        }
-        // noise is that of the dive's fixes where there is one, which is what was stated times what was found
-        let mut noise: Vec<[f64; 3]> = self.fixes.iter().map(|f| f.sigma).collect();
-        for (fix, &i) in dive.fixes.iter().zip(&self.usable) {
-            noise[i] = std::array::from_fn(|a| fix.sigma[a] * scale[a / 2]);
-        }
-        let centres: Vec<f64> = dive.exchanges.iter().map(|e| e.time_s).collect();
-        for ((fix, judged), noise) in self.fixes.iter().zip(&mut self.judged).zip(noise) {
-            let after = centres.partition_point(|&t| t < fix.time_s);
-            let nearer = |&k: &usize| (centres[k] - fix.time_s).abs();
-            let near = [after.saturating_sub(1), after.min(centres.len() - 1)];
-            judged.cycle = near.into_iter().min_by(|a, b| nearer(a).total_cmp(&nearer(b))).unwrap_or(0);
-            let state = track.at(fix.time_s);
-            let mut square = 0.0;
-            for a in 0..3 {
-                judged.residual_m[a] = fix.value[a] - state.position[a];
-                let track_variance = state.position_sigma[a].powi(2);
-                // a fix that the track rests on has pulled it: its residual is smaller than its noise
-                let sign = if judged.verdict == Verdict::Kept { -1.0 } else { 1.0 };
-                let variance = noise[a] * noise[a] + sign * track_variance;
-                square += judged.residual_m[a].powi(2) / variance.max(1e-3 * noise[a] * noise[a]);
-            }
-            judged.residual_sigmas = square.sqrt();
-        }
-    }
-}
-
-/// Where hardly any exchange is believed.
-fn wild_stretches(dive: &Dive, switches: &Switches) -> Vec<Warning> {
-    let wild: Vec<bool> = switches.believed.iter().map(|b| !b).collect();
-    let mut within = vec![false; wild.len()];
-    for (length, most) in STRETCHES {
-        for (begin, window) in wild.windows(length).enumerate() {
-            if window.iter().filter(|w| **w).count() > most {
-                within[begin..begin + length].fill(true);
-            }
-        }
-    }
-    let mut stretches = Vec::new();
-    let mut at = 0;
-    for run in within.chunk_by(|a, b| a == b) {
-        let of = run.len();
-        if run[0] {
-            let [from_s, to_s] = [at, at + of - 1].map(|e| dive.exchanges[e].time_s);
-            let rejected = wild[at..at + of].iter().filter(|w| **w).count();
-            stretches.push(Warning::WildStretch { from_s, to_s, rejected, of });
-        }
-        at += of;
-    }
-    stretches
-}
-
-fn warnings(
-    dive: &Dive,
-    switches: &Switches,
-    track: &Wiener,
-    disputes: &[Dispute],
-    noise_scale: [f64; 2],
-) -> Vec<Warning> {
-    let mut warnings = Vec::new();
-    let (rejected, of) = (switches.believed.iter().filter(|b| !**b).count(), dive.exchanges.len());
-    if rejected as f64 > MANY_WILD * of as f64 {
-        warnings.push(Warning::ManyWildCycles { rejected, of });
-    }
-    warnings.extend(wild_stretches(dive, switches));
-    for dispute in disputes {
-        let [from_s, to_s] = [dispute.from, dispute.to].map(|e| dive.exchanges[e].time_s);
-        let sigma = |e: usize| {
-            track.at(dive.exchanges[e].time_s).position_sigma.iter().fold(0.0, |s: f64, v| s.max(*v))
-        };
-        let sigma = (dispute.from..=dispute.to).map(sigma).fold(0.0, f64::max);
-        let odds = dispute.log_odds.exp();
-        let fix_sigma =
-            dive.fixes[dive.exchanges[dispute.to].fixes.start].sigma.iter().fold(0.0, |s: f64, v| s.max(*v));
-        if odds > RIVAL_ODDS
-            && dispute.apart_m > RIVAL_SIGMAS * sigma
-            && dispute.apart_m > RIVAL_FIX_SIGMAS * fix_sigma
-        {
-            warnings.push(Warning::Ambiguous { from_s, to_s, apart_m: dispute.apart_m, odds });
-        }
-    }
-    for scale in noise_scale {
-        if !(NOISE_FACTOR.recip()..=NOISE_FACTOR).contains(&scale) {
-            warnings.push(Warning::Noise { scale });
-            break;
-        }
-    }
-    warnings
 }

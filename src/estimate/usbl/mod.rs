@@ -45,10 +45,13 @@ pub mod geometry;
 
 mod candidates;
 mod clean;
+mod dive;
+mod judging;
 mod liveliness;
 mod search;
 mod switches;
 mod verdict;
+mod warnings;
 mod wiener;
 
 pub use clean::{Cleaned, Settings, clean};

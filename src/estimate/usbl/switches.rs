@@ -1,7 +1,7 @@
 //! The switches, one an exchange and one a fix, each judged by the track without its exchange.
 
 use super::candidates::{WildShares, least_wild_m2, log_normal, log_off, minus, square};
-use super::clean::Dive;
+use super::dive::Dive;
 use super::wiener::Wiener;
 
 /// Which exchanges and fixes are believed.

@@ -50,7 +50,7 @@ fn the_smoother_equals_dense_batch_least_squares_at_irregular_times() {
     let density = [0.002, 0.01, 0.001, 0.003, 0.002, 0.02];
     let measured = [(0, 1.0, 0.3), (1, 5.0, 0.0), (2, 4.0, -0.4), (4, 90.0, 0.0), (6, 80.0, 1.0)];
     let mut knowledge = vec![[Knowledge::default(); 3]; times.len()];
-    let mut rows: Vec<(Vec<(usize, f64)>, f64, f64)> = vec![(vec![(1, 1.0)], 0.0, 1.0 / 1.44)];
+    let mut rows = vec![(vec![(1, 1.0)], 0.0, 1.0 / 1.44)];
     for (node, z, dt) in measured {
         (0..3).for_each(|axis| knowledge[node][axis].add(z, 0.25, dt));
         rows.push((vec![(2 * node, 1.0), (2 * node + 1, dt)], z, 0.25));
