@@ -43,7 +43,7 @@ const PRIOR_WORTH: f64 = 20.0;
 const DENSITIES: (f64, f64, usize) = (-5.0, -2.0, 5);
 
 /// So many exchanges tell the density well enough for the first search.
-const ENOUGH: usize = 300;
+const ENOUGH: usize = 120;
 
 /// Most rounds in which switches are looked at anew.
 const ROUNDS: usize = 4;

@@ -38,6 +38,25 @@
 //!    restricted likelihood, and a verdict for every fix.
 //!
 //! Where the data can't carry the track, [`Cleaned::warnings`] says so.
+//!
+//! # Use
+//!
+//! ```
+//! use trackfuse::estimate::usbl::{Settings, Verdict, clean};
+//! use trackfuse::sample::Sample;
+//! use trackfuse::track::Curve;
+//!
+//! let fix = |i: u32| Sample {
+//!     time_s: 20.0 * f64::from(i),
+//!     value: [if i == 7 { 90.0 } else { 0.0 }, 0.0, -10.0 * f64::from(i)],
+//!     sigma: [3.0; 3],
+//! };
+//! let fixes: Vec<Sample> = (0..30).map(fix).collect();
+//! let cleaned = clean(&fixes, &[], &Settings::default())?;
+//! assert_eq!(cleaned.judged[7].verdict, Verdict::Wild);
+//! assert!(cleaned.at(130.0).is_some_and(|state| state.position[0].abs() < 5.0));
+//! # Ok::<(), trackfuse::estimate::EstimateError>(())
+//! ```
 
 pub mod causal;
 pub mod cycles;

@@ -240,3 +240,21 @@ fn many_fixes_at_one_instant_are_no_trouble() {
     let state = cleaned(&given).at(400.0).expect("a state");
     assert!((0..3).all(|a| (state.position[a] - truth(400.0)[a]).abs() < 5.0 && state.position_sigma[a].is_finite()));
 }
+
+#[test]
+fn noise_grows_with_range_from_what_it_is_close_by() {
+    assert_eq!(sigma_at_range(3.0, 0.01, 0.0), 3.0);
+    assert!((sigma_at_range(3.0, 0.01, 400.0) - 5.0).abs() < 1e-12);
+}
+
+#[test]
+fn a_lower_speed_limit_makes_a_leap_wild() {
+    // for two minutes the fixes are where a vehicle would have to fly to
+    let given = fixes(|i, _| if (30..36).contains(&i) { [150.0, 0.0, 0.0] } else { [0.0; 3] });
+    let wild = |speed_limit_m_s: f64| {
+        let settings = Settings { speed_limit_m_s, ..Settings::default() };
+        let track = clean(&given, &[], &settings).expect("a track");
+        track.judged[120..144].iter().filter(|j| j.verdict == Verdict::Wild).count()
+    };
+    assert!(wild(1.5) == 24 && wild(40.0) < 12, "{} {}", wild(1.5), wild(40.0));
+}
