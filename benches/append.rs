@@ -1,6 +1,9 @@
 //! Adding a track of 70,000 points to a log, beside copying that log: both end with the bytes on the disk.
 //! The log has 512 MB of incompressible chunks of 4 MB; set `TRACKFUSE_BENCH_MB` for another size.
 
+#[path = "../examples/large_logs/added.rs"]
+mod added;
+
 use std::fs::{self, File};
 use std::io::BufWriter;
 use std::path::Path;
@@ -9,11 +12,7 @@ use criterion::{Criterion, SamplingMode, Throughput, criterion_group, criterion_
 use mcap::records::MessageHeader;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use trackfuse::log::{Appender, Compression, Destination, Log, NewMessage};
-use trackfuse::publish::{Context, Topic, track_messages};
-use trackfuse::sample::Source;
-use trackfuse::time::Time;
-use trackfuse::track::{Method, Phase, State, Track, TrackPoint};
+use trackfuse::log::Destination;
 
 fn make_log(path: &Path, megabytes: u64) {
     let file = BufWriter::new(File::create(path).expect("a temporary file"));
@@ -32,39 +31,12 @@ fn make_log(path: &Path, megabytes: u64) {
     writer.finish().expect("a summary");
 }
 
-fn track() -> Track {
-    let point = |i: i64| {
-        let t = i as f64 * 0.01;
-        let state = State {
-            position: [t.sin(), t.cos(), -60.0 + 0.01 * t],
-            velocity: [t.cos(), -t.sin(), 0.01],
-            acceleration: Some([-t.sin(), -t.cos(), 0.0]),
-            position_sigma: [0.1; 3],
-            velocity_sigma: [0.1; 3],
-        };
-        let time = Time::from_ns(1_000_000_000 + i * 10_000_000);
-        TrackPoint { time, state, phase: Phase::Single, method: Method::Spline, seen_by: 1 }
-    };
-    Track { frame_id: "enu".into(), points: (0..70_000).map(point).collect() }
-}
-
 fn append(c: &mut Criterion) {
     let megabytes = std::env::var("TRACKFUSE_BENCH_MB").ok().and_then(|v| v.parse().ok()).unwrap_or(512);
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (input, output) = (folder.path().join("in.mcap"), folder.path().join("out.mcap"));
     make_log(&input, megabytes);
-    let track = track();
-    let sources = [Source { name: "tether".into(), ..Source::default() }];
-    let zero = Time::from_ns(0);
-    let context = Context {
-        sources: &sources,
-        origin: zero,
-        rate_hz: 100.0,
-        t0: zero,
-        surface_at_zero: true,
-        log_start: None,
-    };
-    let channels = Topic::ALL.map(|t| t.channel("/fused"));
+    let track = added::track(1_000_000_000);
 
     let mut group = c.benchmark_group("append");
     group
@@ -79,15 +51,8 @@ fn append(c: &mut Criterion) {
     });
     group.bench_function("copy and add 70,000 points", |b| {
         b.iter(|| {
-            let log = Log::open(&input).expect("a log");
-            let destination = Destination::New { out: output.clone(), force: true };
-            let mut appender =
-                Appender::begin(&log, &destination, &channels, Compression::Zstd).expect("an appender");
-            for message in track_messages(Topic::Track, &track, context) {
-                let (time_ns, data) = (message.time.to_log(), &message.data[..]);
-                appender.write(NewMessage { channel: message.topic as usize, time_ns, data }).expect("room");
-            }
-            appender.finish().expect("a log")
+            let to = Destination::New { out: output.clone(), force: true };
+            added::add(&input, &to, &track).expect("a log");
         });
     });
     group.finish();

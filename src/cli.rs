@@ -10,7 +10,16 @@ use crate::estimate::characteristic_point::Height;
 /// Where was the vehicle really? Reads an MCAP recording of a sea trial, fuses its position and velocity
 /// channels into one 3-D track, and writes that track back beside them.
 #[derive(Debug, Parser)]
-#[command(version, max_term_width = 100)]
+#[command(
+    version = concat!(env!("CARGO_PKG_VERSION"), env!("TRACKFUSE_COMMIT")),
+    max_term_width = 100,
+    after_help = "Examples:
+  trackfuse inspect dive.mcap                what is in it, and what `fuse` would take of it
+  trackfuse fuse dive.mcap                   writes dive.fused.mcap, for Foxglove or Lichtblick
+  trackfuse export dive.fused.mcap -o dive.kml
+
+`trackfuse COMMAND --help` tells more, with examples."
+)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -35,7 +44,7 @@ pub enum Command {
     /// Errors phase by phase and at characteristic points (Zhang 2025, eq. 12 and 13), 3-D and by axis, and
     /// whether the track's 95 % bands hold the reference.
     Compare(Compare),
-    /// Get a track out of a log, as a table
+    /// Get a track out of a log, for other tools: as a table, on a map, as a trajectory
     Export(Export),
     /// Make a log with known truth from a scenario file
     Simulate(Simulate),
@@ -45,6 +54,10 @@ pub enum Command {
     Inspect(Inspect),
     /// Write a commented config for a log: its sources, and every other key with its default
     Init(Init),
+    /// Print a script that lets a shell complete trackfuse's commands and options
+    Completions(Completions),
+    /// Print trackfuse's manual page, or write those of all commands
+    Man(Man),
 }
 
 /// How a command talks.
@@ -84,6 +97,7 @@ fn bytes(text: &str) -> Result<u64, String> {
   trackfuse fuse dive.mcap --config dive.toml    names sources, heights, horizon, ...
   trackfuse fuse dive.mcap --in-place            adds to dive.mcap: needs no second copy of a large log
   trackfuse fuse dive.mcap --sidecar track.mcap  writes the new channels only, for viewers that merge logs
+  trackfuse fuse dive.mcap --report dive.html    writes a report with plots for the browser, too
 
 Exit codes: 0 done; 1 failed, nothing written; 2 usage or config wrong, sources ambiguous, output
 exists; 3 done, with warnings that a person must read")]
@@ -102,10 +116,13 @@ pub struct Fuse {
     /// Write the new channels only, as a log of their own
     #[arg(long, value_name = "OUT", conflicts_with = "output")]
     pub sidecar: Option<PathBuf>,
+    /// Write a report with plots beside it: one page for browser and paper, which needs no network
+    #[arg(long, value_name = "FILE.html")]
+    pub report: Option<PathBuf>,
     /// Replace an existing output
     #[arg(long)]
     pub force: bool,
-    /// Refuse a log that is damaged, instead of using what can be trusted
+    /// Refuse a log that is damaged, instead of using what can be trusted; reads all of it, for its checksum
     #[arg(long)]
     pub strict: bool,
     /// Prefix of the new topics [default: the config's, else /fused]
@@ -129,7 +146,8 @@ pub struct Fuse {
   trackfuse restore dive.mcap --in-place         takes off what `fuse --in-place` added to it
   trackfuse restore dive.mcap                    after a run was cut off: puts dive.mcap back
 
-Exit codes: 0 done; 1 failed, nothing written; 2 output exists")]
+Exit codes: 0 done; 1 failed, nothing written; 2 output exists; 3 done, with warnings that a person must
+read, such as that the original is damaged")]
 pub struct Restore {
     /// The log that was added to
     pub log: PathBuf,
@@ -152,6 +170,11 @@ pub struct Restore {
 
 /// Arguments of `simulate`.
 #[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  trackfuse simulate sample_logs/steep_climb.scenario.toml -o climb.mcap
+  trackfuse fuse climb.mcap && trackfuse compare climb.fused.mcap --reference /reference/ins
+
+Exit codes: 0 done; 1 failed, nothing written; 2 scenario wrong, or output exists")]
 pub struct Simulate {
     /// The scenario file (TOML; see `sample_logs`)
     pub scenario: PathBuf,
@@ -190,7 +213,7 @@ pub struct Compare {
     /// A further height to compare at, such as exit=-2, in metres, Z up [default: those on the events topic]
     #[arg(long, value_name = "NAME=Z", value_parser = height, allow_hyphen_values = true)]
     pub height: Vec<Height>,
-    /// Refuse a log that is damaged, instead of using what can be trusted
+    /// Refuse a log that is damaged, instead of using what can be trusted; reads all of it, for its checksum
     #[arg(long)]
     pub strict: bool,
     /// What the log may take.
@@ -212,26 +235,36 @@ fn height(text: &str) -> Result<Height, String> {
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
   trackfuse export dive.fused.mcap > dive.csv
+  trackfuse export dive.fused.mcap -o dive.parquet                         for pandas, DuckDB, MATLAB
+  trackfuse export dive.fused.mcap -o dive.kml                             for Google Earth
+  trackfuse export dive.fused.mcap -o dive.geojson --origin 59.4,10.5,0    for QGIS and web maps
+  trackfuse export dive.fused.mcap -o dive.tum                             for evo
   trackfuse export dive.fused.mcap --topic /fused/pcf -o pcf.csv
 
-Exit codes: 0 done; 1 failed, nothing written; 2 output exists, or no such topic; 3 done, with warnings
-that a person must read, such as messages that can't be read")]
+Maps hold at most 20,000 vertices, chosen to keep the track's shape; all other formats hold every point.
+
+Exit codes: 0 done; 1 failed, nothing written; 2 output exists, no such topic, or a map without an
+origin; 3 done, with warnings that a person must read, such as messages that can't be read")]
 pub struct Export {
     /// The log to read
     pub log: PathBuf,
     /// Topic of the track; a channel with a position will do too
     #[arg(long, value_name = "TOPIC", default_value = "/fused/track")]
     pub topic: String,
-    /// Format of the table
-    #[arg(long, value_enum, default_value = "csv")]
-    pub format: Format,
+    /// Format [default: what FILE's ending says, else csv]
+    #[arg(long, value_enum)]
+    pub format: Option<Format>,
+    /// Latitude and longitude in degrees, and altitude above the WGS 84 ellipsoid in metres, of the track's zero,
+    /// for maps [default: the log's]
+    #[arg(long, value_name = "LAT,LON,ALT", value_parser = origin, allow_hyphen_values = true)]
+    pub origin: Option<[f64; 3]>,
     /// The file to write [default: stdout]
     #[arg(long, short, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Replace an existing output
     #[arg(long)]
     pub force: bool,
-    /// Refuse a log that is damaged, instead of using what can be trusted
+    /// Refuse a log that is damaged, instead of using what can be trusted; reads all of it, for its checksum
     #[arg(long)]
     pub strict: bool,
     /// What the log may take.
@@ -242,18 +275,41 @@ pub struct Export {
     pub voice: Voice,
 }
 
-/// Formats of a table.
+fn origin(text: &str) -> Result<[f64; 3], String> {
+    let expected = || {
+        format!(
+            "expected latitude and longitude in degrees and altitude in metres, such as 59.4,10.5,0, got {text:?}"
+        )
+    };
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|number| number.trim().parse()).collect();
+    let place: [f64; 3] = numbers.ok().and_then(|n| n.try_into().ok()).ok_or_else(expected)?;
+    let on_earth = place[0].abs() <= 90.0 && place[1].abs() <= 360.0 && place[2].abs() <= 1e5;
+    if on_earth { Ok(place) } else { Err(expected()) }
+}
+
+/// Formats of other tools.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     /// Comma-separated values; every column's name holds its unit
     Csv,
+    /// Apache Parquet: the same columns, with types and the track's provenance
+    Parquet,
+    /// GeoJSON: lines coloured by phase, and characteristic points
+    Geojson,
+    /// KML, for Google Earth: the same
+    Kml,
+    /// Trajectory of the TUM benchmark, as evo reads it; its orientation means nothing
+    Tum,
 }
 
 /// Arguments of `inspect`.
 #[derive(Args, Debug)]
-#[command(
-    after_help = "Exit codes: 0 done; 1 the log can't be opened; 3 done, with warnings that a person must read"
-)]
+#[command(after_help = "Examples:
+  trackfuse inspect dive.mcap                of 50 GB, in seconds
+  trackfuse inspect dive.mcap --verify       reads all of it, and checks all that can be checked
+  trackfuse inspect dive.mcap --json | jq '.channels[].topic'
+
+Exit codes: 0 done; 1 the log can't be opened; 3 done, with warnings that a person must read")]
 pub struct Inspect {
     /// The log to look into
     pub log: PathBuf,
@@ -273,13 +329,16 @@ pub struct Inspect {
 #[command(after_help = "Examples:
   trackfuse init dive.mcap -o dive.toml && trackfuse fuse dive.mcap --config dive.toml
   trackfuse init dive.mcap --source /gps/fix --source /odometry -o dive.toml    the datum first
+  trackfuse init dive.mcap --source /gps/fix,/dvl/twist -o dive.toml            one source of two topics
 
 Exit codes: 0 done; 1 failed, nothing written; 2 output exists; 3 done, with warnings that a person
 must read, such as that the config names no source until one is chosen in it")]
 pub struct Init {
     /// The log to write a config for
     pub log: PathBuf,
-    /// A topic to take as a source, the datum's first [default: what the topics' names tell]
+    /// A topic to take as a source, the datum's first; two with a comma between them for a position and a velocity
+    /// that are of one source, as topics are whose names say so, such as /gps/pose and /gps/twist [default: what the
+    /// topics' names tell]
     #[arg(long, value_name = "TOPIC")]
     pub source: Vec<String>,
     /// The config to write [default: stdout]
@@ -294,4 +353,32 @@ pub struct Init {
     /// How to talk.
     #[command(flatten)]
     pub voice: Voice,
+}
+
+/// Arguments of `completions`.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  trackfuse completions bash > ~/.local/share/bash-completion/completions/trackfuse
+  trackfuse completions fish > ~/.config/fish/completions/trackfuse.fish
+  trackfuse completions zsh > _trackfuse                                  in a folder of $fpath")]
+pub struct Completions {
+    /// The shell
+    #[arg(value_enum)]
+    pub shell: clap_complete::Shell,
+}
+
+/// Arguments of `man`.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  trackfuse man | man -l -
+  trackfuse man -o ~/.local/share/man/man1       trackfuse.1, trackfuse-fuse.1, ...
+
+Exit codes: 0 done; 1 failed; 2 a page exists")]
+pub struct Man {
+    /// The folder to write the pages to, one a command [default: that of trackfuse itself, to stdout]
+    #[arg(long, short, value_name = "FOLDER")]
+    pub output: Option<PathBuf>,
+    /// Replace existing pages
+    #[arg(long)]
+    pub force: bool,
 }

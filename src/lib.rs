@@ -32,6 +32,7 @@ pub mod cli;
 pub mod commands;
 pub mod config;
 pub mod estimate;
+pub mod export;
 pub mod fusion;
 pub mod inspect;
 pub mod log;

@@ -35,6 +35,8 @@ fn main() -> ExitCode {
         Command::Restore(args) => commands::restore(args),
         Command::Inspect(args) => commands::inspect(args),
         Command::Init(args) => commands::init(args),
+        Command::Completions(args) => commands::completions(args),
+        Command::Man(args) => commands::man(args),
     };
     match done {
         Ok(outcome) => outcome.into(),

@@ -224,8 +224,10 @@ pub fn warnings_of(loaded: &[Loaded], shift_s: Option<f64>) -> Vec<String> {
         .collect();
     if frames.len() > 1 {
         let list: Vec<String> = frames.iter().map(|(frame, name)| format!("{name} in {frame:?}")).collect();
-        warnings
-            .push(format!("the sources name different frames ({}): they are taken as one", list.join(", ")));
+        warnings.push(format!(
+            "the sources name different frames ({}): they are taken as one, but for what the registration finds",
+            list.join(", ")
+        ));
     }
     if let Some(shift) = shift_s {
         warnings.push(format!(

@@ -9,6 +9,7 @@
 mod viewer_rules;
 
 mod cli {
+    mod axes;
     mod bad_input;
     mod compare;
     mod crash;
@@ -20,9 +21,12 @@ mod cli {
     mod init;
     mod inspect;
     mod output;
+    mod output_encodings;
     mod readme;
     mod real_logs;
+    mod report;
     mod restore;
+    mod restore_of_changed;
     mod sources;
     mod trial;
     mod trial_log;

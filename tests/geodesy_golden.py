@@ -1,4 +1,4 @@
-"""The numbers in `src/math/geodesy.rs`, by an independent library: `pip install pymap3d`."""
+"""The numbers in `src/math/geodesy.rs` and `tests/cli/fixes.rs`, by an independent library: `pip install pymap3d`."""
 
 import pymap3d
 
@@ -13,3 +13,5 @@ for origin, place in PLACES:
     enu = pymap3d.geodetic2enu(*place, *origin)
     print(f"({list(origin)}, {list(place)}, {[float(v) for v in enu]}),")
 print([float(v) for v in pymap3d.geodetic2ecef(42.375812, -71.147394667, 7.3)])
+for t in (0.5 * k for k in range(13)):
+    print([float(v) for v in pymap3d.enu2geodetic(100 + 4 * t, -50 + 3 * t, -2 * t, 59.4, 10.5, 3.0)])

@@ -10,6 +10,8 @@
 
 #[path = "round_trip/damage.rs"]
 mod damage;
+#[path = "round_trip/endings.rs"]
+mod endings;
 #[path = "round_trip/hostile.rs"]
 mod hostile;
 #[path = "round_trip/raw.rs"]
@@ -47,7 +49,7 @@ fn append(log: &Log, out: &Path, compression: Compression, force: bool) -> Resul
         appender.write(NewMessage { channel: 0, time_ns: 1_000 + i, data: data.as_bytes() })?;
     }
     let entries = BTreeMap::from([("version".to_owned(), "0".to_owned())]);
-    appender.write_metadata(&NewMetadata { name: "trackfuse:/fused".to_owned(), entries })?;
+    appender.add_metadata(NewMetadata { name: "trackfuse:/fused".to_owned(), entries });
     appender.finish()
 }
 

@@ -7,10 +7,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use trackfuse::log::ReadOptions;
 use trackfuse::log::verify::{Verification, verify};
 
 fn verified(path: &Path) -> Verification {
-    verify(path, &mut |_, _| {}).unwrap()
+    verify(path, ReadOptions::default()).unwrap()
 }
 
 fn logs_below(folder: &Path) -> Vec<PathBuf> {

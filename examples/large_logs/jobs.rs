@@ -10,15 +10,13 @@ use trackfuse::cli::{self, Cli};
 use trackfuse::commands;
 use trackfuse::config::Config;
 use trackfuse::fusion::{self, Fusion};
-use trackfuse::log::{Appender, Compression, Destination, Log, LogError, NewMessage, ReadOptions};
-use trackfuse::publish::{Context, Topic, track_messages};
+use trackfuse::log::{Destination, Log, LogError, ReadOptions};
 use trackfuse::resolve;
 use trackfuse::sample::Source;
 use trackfuse::source::{self, Samples};
 use trackfuse::time::Time;
-use trackfuse::track::{Method, Phase, State, Track, TrackPoint};
 
-use crate::{Job, make, peers};
+use crate::{Job, added, make, peers};
 
 /// The last line that a job prints begins with this.
 pub(crate) const TOOK: &str = "took ";
@@ -26,17 +24,21 @@ pub(crate) const TOOK: &str = "took ";
 /// Does a job, and prints its seconds and the most memory that the process had, kB.
 pub(crate) fn run(job: Job, input: &Path, output: &Path) {
     // made beforehand: it is not what is measured
-    let track = (job == Job::Add).then(track);
+    let track = added::track(1_700_000_000_000_000_000);
     let start = Instant::now();
     match job {
         Job::Messages => read(input, false),
         Job::WholeChunks => read(input, true),
         Job::IndexedReader => assert_eq!(peers::read_indexed(input), 2 * make::SAMPLES, "messages"),
         Job::Copy => copy(input, output),
-        Job::Add => add(input, output, &track.expect("a track")),
+        Job::Add => {
+            let to = Destination::New { out: output.to_owned(), force: true };
+            added::add(input, &to, &track).expect("a log");
+        }
+        Job::AddInPlace => added::add(output, &Destination::InPlace, &track).expect("a log"),
         Job::Fit => drop(fit(input)),
         Job::Fuse => fuse(&[input.as_os_str(), "-o".as_ref(), output.as_os_str(), "--force".as_ref()]),
-        Job::InPlace => fuse(&[output.as_os_str(), "--in-place".as_ref()]),
+        Job::FuseInPlace => fuse(&[output.as_os_str(), "--in-place".as_ref()]),
         Job::Rewrite => peers::rewrite(input, output, &fit(input)),
     }
     let took_s = start.elapsed().as_secs_f64();
@@ -98,42 +100,4 @@ fn fit(input: &Path) -> Fitted {
     let plan = resolve::plan(&mut config, &loaded, &sources, datum, origin, &mut Vec::new()).expect("a plan");
     let fusion = fusion::fuse(&sources, &plan).expect("a track");
     Fitted { sources, origin, rate_hz: plan.rate_hz, fusion }
-}
-
-fn add(input: &Path, output: &Path, track: &Track) {
-    let sources = [Source { name: "tether".into(), ..Source::default() }];
-    let zero = Time::from_ns(0);
-    let context = Context {
-        sources: &sources,
-        origin: zero,
-        rate_hz: 100.0,
-        t0: zero,
-        surface_at_zero: true,
-        log_start: None,
-    };
-    let log = Log::open(input).expect("a log");
-    let channels = [Topic::Track.channel("/added")];
-    let to = Destination::New { out: output.to_owned(), force: true };
-    let mut appender = Appender::begin(&log, &to, &channels, Compression::Zstd).expect("an appender");
-    for message in track_messages(Topic::Track, track, context) {
-        let (time_ns, data) = (message.time.to_log(), &message.data[..]);
-        appender.write(NewMessage { channel: 0, time_ns, data }).expect("room");
-    }
-    appender.finish().expect("a log");
-}
-
-fn track() -> Track {
-    let point = |i: u64| {
-        let t = i as f64 * 0.01;
-        let state = State {
-            position: [t.sin(), t.cos(), -60.0 + 0.01 * t],
-            velocity: [t.cos(), -t.sin(), 0.01],
-            acceleration: Some([-t.sin(), -t.cos(), 0.0]),
-            position_sigma: [0.1; 3],
-            velocity_sigma: [0.1; 3],
-        };
-        let time = Time::from_ns(1_700_000_000_000_000_000 + i as i64 * 10_000_000);
-        TrackPoint { time, state, phase: Phase::Single, method: Method::Spline, seen_by: 1 }
-    };
-    Track { frame_id: "enu".into(), points: (0..make::SAMPLES).map(point).collect() }
 }

@@ -8,6 +8,7 @@
 //! each of two jobs that ran one after the other. Every job is a process of its own, reads a log that the system has
 //! in its cache, and ends with its bytes on the disk.
 
+mod added;
 mod jobs;
 mod make;
 mod measure;
@@ -51,12 +52,14 @@ enum Job {
     Copy,
     /// Adds a track of 70,000 points to a new file.
     Add,
+    /// Adds the same track to the log itself.
+    AddInPlace,
     /// Reads the sources and fits the track, as `fuse` does.
     Fit,
     /// `trackfuse fuse`.
     Fuse,
     /// `trackfuse fuse --in-place`.
-    InPlace,
+    FuseInPlace,
     /// What `fuse` does, by the mcap crate's reader and writer.
     Rewrite,
 }

@@ -9,6 +9,7 @@ use mcap::records::MessageHeader;
 use mcap::sans_io::indexed_reader::{IndexedReadEvent, IndexedReader, IndexedReaderOptions};
 use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader};
 use mcap::{Compression, Summary, WriteOptions};
+use trackfuse::log::{Encoding, NewChannel};
 use trackfuse::publish::{Context, Topic, messages};
 
 use crate::jobs::Fitted;
@@ -63,12 +64,13 @@ pub(crate) fn rewrite(input: &Path, output: &Path, fitted: &Fitted) {
     for message in mcap::io::MessageReader::new(source) {
         writer.write(&message.expect("a message")).expect("room on the disk");
     }
-    let channels = Topic::ALL.map(|topic| {
-        let new = topic.channel("/fused");
+    let new = Topic::channels(&Topic::written(Encoding::Json, false), "/fused", Encoding::Json);
+    let mut channel = |new: &NewChannel| {
         let schema =
             writer.add_schema(&new.schema_name, &new.schema_encoding, &new.schema).expect("a schema");
         writer.add_channel(schema, &new.topic, &new.message_encoding, &BTreeMap::new()).expect("a channel")
-    });
+    };
+    let channels: Vec<u16> = new.iter().map(&mut channel).collect();
     let context = Context {
         sources: &fitted.sources,
         origin: fitted.origin,
@@ -76,6 +78,8 @@ pub(crate) fn rewrite(input: &Path, output: &Path, fitted: &Fitted) {
         t0: fitted.origin,
         surface_at_zero: true,
         log_start: None,
+        encoding: Encoding::Json,
+        geodetic: None,
     };
     for (i, message) in messages(&fitted.fusion, context, "", &[]).enumerate() {
         let time = message.time.to_log();

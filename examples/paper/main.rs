@@ -2,6 +2,8 @@
 
 mod chart;
 mod figures;
+#[path = "../shared/page.rs"]
+mod page;
 mod remade;
 
 use std::error::Error;
@@ -12,7 +14,7 @@ use std::path::{Path, PathBuf};
 pub(crate) fn files() -> Result<Vec<(PathBuf, String)>, Box<dyn Error>> {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
     let page = docs.join("paper.md");
-    let filled = remade::page::filled(&fs::read_to_string(&page)?)?;
+    let filled = page::filled(&fs::read_to_string(&page)?, &remade::tables::all())?;
     let mut files = vec![(page, filled)];
     for (name, draw) in figures::FIGURES {
         files.push((docs.join("paper").join(name), draw()?));

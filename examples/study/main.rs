@@ -10,6 +10,7 @@
 mod climbs;
 mod family;
 mod flight;
+#[path = "../shared/page.rs"]
 mod page;
 mod peers;
 mod pool;

@@ -7,7 +7,9 @@ use std::path::Path;
 use tempfile::TempDir;
 use trackfuse::inspect::inspect;
 use trackfuse::log::verify::verify as verify_file;
-use trackfuse::log::{Appender, Compression, Destination, Log, LogError, NewChannel, NewMessage};
+use trackfuse::log::{
+    Appender, Compression, Destination, Log, LogError, NewChannel, NewMessage, ReadOptions,
+};
 
 thread_local! {
     static FOLDER: TempDir = tempfile::tempdir().expect("a temporary folder");
@@ -110,7 +112,7 @@ pub fn append(data: &[u8]) {
 /// Verifies a log: what has no finding opens, and has as many messages for the reader as for the verifier.
 pub fn verify(data: &[u8]) {
     with_file(data, |_, path| {
-        let Ok(found) = verify_file(path, &mut |_, _| {}) else { return };
+        let Ok(found) = verify_file(path, ReadOptions::default()) else { return };
         assert_eq!(found.is_clean() && found.left_out == 0, found.is_clean());
         if found.is_clean() {
             let log = Log::open(path).expect("nothing is wrong with it");

@@ -5,12 +5,10 @@ use super::{CommandError, Outcome, open, show};
 use crate::cli::Compare;
 use crate::estimate::characteristic_point::Height;
 use crate::log::decode::MessagePath;
-use crate::log::{Log, passed_over};
 use crate::quality::{self, Comparison};
 use crate::report::{ComparisonParts, ComparisonReport, render_comparison};
 use crate::sample::Quantity;
 use crate::source::{self, Loaded, Recorded, SigmaOrigin};
-use crate::time::Time;
 
 /// Holds a track against a reference, and says how far they are apart.
 ///
@@ -29,7 +27,9 @@ pub fn compare(args: &Compare) -> Result<Outcome, CommandError> {
     for quantity in Quantity::ALL {
         reference.source.series_mut(quantity).iter_mut().for_each(|s| s.time_s += shift_s);
     }
-    let (mut heights, left_out) = heights_of_events(&log, &args.estimate)?;
+    let (events, left_out) = source::recorded_events(&log, &args.estimate)?;
+    let mut heights: Vec<Height> =
+        events.into_iter().map(|event| Height { name: event.name, z_m: event.position[2] }).collect();
     for height in &args.height {
         if !heights.contains(height) {
             heights.push(height.clone());
@@ -61,24 +61,6 @@ pub fn compare(args: &Compare) -> Result<Outcome, CommandError> {
     });
     show(args.voice, &render_comparison(&report), &report, &warnings)?;
     Ok(if warnings.is_empty() { Outcome::Done } else { Outcome::Warned })
-}
-
-/// The heights of the characteristic points that were written beside the track, and what can't be read of them.
-fn heights_of_events(log: &Log, topic: &str) -> Result<(Vec<Height>, Vec<String>), CommandError> {
-    let prefix = topic.rsplit_once('/').map_or("", |(prefix, _)| prefix);
-    let events = format!("{prefix}/events");
-    let channels = log.index().channels_of(&events).map(|c| c.id).collect();
-    let mut found: Vec<(Time, Height)> = Vec::new();
-    let read = log.for_each_message(&channels, |message| {
-        let value: serde_json::Value = serde_json::from_slice(message.data).unwrap_or_default();
-        if let (Some(name), Some(z_m)) = (value["name"].as_str(), value["position"]["z"].as_f64()) {
-            let time = Time::from_log(message.log_time).unwrap_or(Time::from_ns(0));
-            found.push((time, Height { name: name.to_owned(), z_m }));
-        }
-        Ok::<_, crate::log::LogError>(())
-    })?;
-    found.sort_by_key(|(time, _)| *time);
-    Ok((found.into_iter().map(|(_, height)| height).collect(), passed_over(&read.damaged)))
 }
 
 /// What would make the numbers mean something else than they seem to.

@@ -1,22 +1,66 @@
 //! `trackfuse export`: a track out of a log.
 
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, IsTerminal, Write};
+use std::path::Path;
+
+use clap::ValueEnum;
 
 use super::progress::Bar;
-use super::{CommandError, Outcome, open, say, show};
+use super::{CommandError, Outcome, note, open, say, show};
 use crate::cli::{Export, Format};
-use crate::log::{LogError, write_new};
+use crate::export::{Exported, Map, csv, geojson, kml, parquet, tum};
+use crate::log::{Log, LogError, write_new};
 use crate::printable::printable;
-use crate::report::{ExportReport, csv};
-use crate::source;
+use crate::report::ExportReport;
+use crate::source::{self, Recorded};
 
-/// Writes a track as a table, on stdout or to a file.
+/// Why a track can't be had in a format.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ExportError {
+    /// Maps want a place on the earth.
+    #[error("topic {topic:?}: no latitude and longitude of its zero is known, expected one for {format}")]
+    NoOrigin {
+        /// The topic.
+        topic: String,
+        /// The format.
+        format: &'static str,
+    },
+    /// Bytes that would steer a terminal.
+    #[error("{format} is not for a terminal, expected an output")]
+    ForNoTerminal {
+        /// The format.
+        format: &'static str,
+    },
+    /// The report holds the table only.
+    #[error("`--json` without an output holds the table itself, expected format csv, got {format}")]
+    NotInJson {
+        /// The format.
+        format: &'static str,
+    },
+}
+
+impl ExportError {
+    /// What to do about it.
+    #[must_use]
+    pub fn hint(&self) -> &'static str {
+        match self {
+            Self::NoOrigin { .. } => {
+                "`--origin LAT,LON,ALT` gives it, in degrees and metres; `output.origin` in the config of `fuse` does so once \
+                 and for all"
+            }
+            Self::ForNoTerminal { .. } | Self::NotInJson { .. } => "`-o FILE` names one",
+        }
+    }
+}
+
+/// Writes a track in a format of other tools, on stdout or to a file.
 ///
 /// # Errors
-/// [`CommandError`] for a log that can't be read, a channel that holds no track, and an output that can't be
-/// written.
+/// [`CommandError`] for a log that can't be read, a channel that holds no track, a format that the track can't be
+/// written in, and an output that can't be written.
 pub fn export(args: &Export) -> Result<Outcome, CommandError> {
-    let Format::Csv = args.format;
+    let format = format(args);
+    check_output(args, format)?;
     let bar = Bar::new(args.voice);
     let (log, damage) = open(&args.log, args.memory, args.strict, &bar)?;
     if let Some(out) = &args.output {
@@ -24,27 +68,34 @@ pub fn export(args: &Export) -> Result<Outcome, CommandError> {
     }
     let mut recorded = source::recorded(&log, &args.topic)?;
     recorded.warnings.splice(..0, damage);
+    let map = match format {
+        Format::Geojson | Format::Kml => Some(map(args, format, &log, &mut recorded)?),
+        Format::Csv | Format::Parquet | Format::Tum => None,
+    };
     drop(bar);
-    let t0 = recorded.origin();
+    let written = Written { exported: Exported { topic: &args.topic, recorded: &recorded }, map, format };
+    let mut report = ExportReport::new(args.log.display().to_string(), &args.topic, name(format), &recorded);
+    if let Some(vertices) = written.map.as_ref().map(Map::vertices).filter(|v| *v < report.points) {
+        note(args.voice, &format!("a map's lines are thinned: {vertices} of {} points", report.points));
+    }
     let warnings = &recorded.warnings;
-    let mut report = ExportReport::new(args.log.display().to_string(), &args.topic, &recorded);
     if let Some(out) = &args.output {
         let len = write_new(out, args.force, |file| {
-            csv::write_csv(&recorded, t0, file)
-                .map_err(|source| LogError::Write { path: out.clone(), source })
+            written.write(file).map_err(|source| LogError::Write { path: out.clone(), source })
         })?;
-        let text = format!("{} -> {} ({} points, {len} bytes)", args.topic, out.display(), report.points);
+        let (points, format) = (report.points, name(format));
+        let text = format!("{} -> {} ({format}, {points} points, {len} bytes)", args.topic, out.display());
         let mut text = printable(&text).into_owned() + "\n";
         text.extend(warnings.iter().map(|w| format!("warning: {}\n", printable(w))));
         report.output = Some(out.display().to_string());
         report.bytes = Some(len.to_string());
         say(args.voice, &text, &report, warnings);
     } else if args.voice.json {
-        report.rows = Some(csv::rows(&recorded, t0).collect());
+        report.rows = Some(csv::rows(&recorded, recorded.origin()).collect());
         show(args.voice, "", &report, warnings)?;
     } else {
-        let mut stdout = BufWriter::new(io::stdout().lock());
-        match csv::write_csv(&recorded, t0, &mut stdout).and_then(|()| stdout.flush()) {
+        let mut stdout = BufWriter::new(io::stdout());
+        match written.write(&mut stdout).and_then(|()| stdout.flush()) {
             // a reader that went away wants no more
             Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
                 return Err(CommandError::Print(error));
@@ -54,4 +105,66 @@ pub fn export(args: &Export) -> Result<Outcome, CommandError> {
         super::warn(args.voice, warnings);
     }
     Ok(if warnings.is_empty() { Outcome::Done } else { Outcome::Warned })
+}
+
+/// The format that is asked for, else that of the output's ending, else CSV.
+fn format(args: &Export) -> Format {
+    let ending = args.output.as_deref().and_then(Path::extension).and_then(|e| e.to_str());
+    let of_ending = || Format::from_str(ending?, true).ok();
+    args.format.or_else(of_ending).unwrap_or(Format::Csv)
+}
+
+/// Refuses formats that can't go where they should, before any work is done.
+fn check_output(args: &Export, format: Format) -> Result<(), ExportError> {
+    let name = name(format);
+    match format {
+        _ if args.output.is_some() => Ok(()),
+        Format::Csv => Ok(()),
+        _ if args.voice.json => Err(ExportError::NotInJson { format: name }),
+        Format::Parquet if io::stdout().is_terminal() => Err(ExportError::ForNoTerminal { format: name }),
+        _ => Ok(()),
+    }
+}
+
+/// The track as a map shows it, with the characteristic points beside it.
+fn map(args: &Export, format: Format, log: &Log, recorded: &mut Recorded) -> Result<Map, CommandError> {
+    let (topic, format) = (args.topic.clone(), name(format));
+    let origin = args.origin.or(recorded.fix_origin).ok_or(ExportError::NoOrigin { topic, format })?;
+    let of_a_track = recorded.has_phases && args.topic.ends_with("/track");
+    let (events, left_out) =
+        if of_a_track { source::recorded_events(log, &args.topic)? } else { Default::default() };
+    let new: Vec<String> = left_out.into_iter().filter(|w| !recorded.warnings.contains(w)).collect();
+    recorded.warnings.extend(new);
+    Ok(Map::new(Exported { topic: &args.topic, recorded }, &events, origin))
+}
+
+fn name(format: Format) -> &'static str {
+    match format {
+        Format::Csv => "csv",
+        Format::Parquet => "parquet",
+        Format::Geojson => "geojson",
+        Format::Kml => "kml",
+        Format::Tum => "tum",
+    }
+}
+
+/// What is written.
+struct Written<'a> {
+    exported: Exported<'a>,
+    /// For the formats that are maps.
+    map: Option<Map>,
+    format: Format,
+}
+
+impl Written<'_> {
+    fn write(&self, out: &mut (impl Write + Send)) -> io::Result<()> {
+        let recorded = self.exported.recorded;
+        match (self.format, &self.map) {
+            (Format::Geojson, Some(map)) => geojson::write_geojson(map, out),
+            (Format::Kml, Some(map)) => kml::write_kml(map, out),
+            (Format::Parquet, _) => parquet::write_parquet(self.exported, out),
+            (Format::Tum, _) => tum::write_tum(self.exported, out),
+            _ => csv::write_csv(recorded, recorded.origin(), out),
+        }
+    }
 }

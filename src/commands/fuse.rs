@@ -5,13 +5,17 @@ use std::io::Read;
 use sha2::{Digest, Sha256};
 
 use super::progress::Bar;
-use super::{CommandError, Outcome, beside, damage_of, note, say};
+use super::{CommandError, Outcome, beside, checked, html_report, note, options, say};
 use crate::cli::Fuse;
 use crate::config::Config;
 use crate::fusion::{self, Fusion};
-use crate::log::{Appender, Destination, Log, LogError, MessagesRead, NewMetadata, ReadOptions, put_back};
-use crate::publish::{Context, Topic, messages};
-use crate::report::{self, Report};
+use crate::log::{
+    Appender, Destination, Encoding, Log, LogError, NewMessage, NewMetadata, ReadOptions, bad_chunks,
+    put_back,
+};
+use crate::math::geodesy::{Geodetic, LocalFrame};
+use crate::publish::{Context, Published, Topic, messages};
+use crate::report::{self, Report, html};
 use crate::resolve;
 use crate::sample::Source;
 use crate::source::{self, Recognised, Samples};
@@ -33,24 +37,23 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         note(args.voice, &format!("a run that added to {log} was cut off: {log} is as it was before that"));
     }
     let bar = Bar::new(args.voice);
-    let options = ReadOptions {
-        memory_limit: args.memory.memory_limit,
-        whole_chunks: args.check_chunks,
-        observer: bar.observer(),
-    };
+    let options = ReadOptions { whole_chunks: args.check_chunks, ..options(args.memory, &bar) };
     let open = if args.in_place { Log::open_in_place_with } else { Log::open_with };
-    let log = open(&args.log, options)?;
-    let mut warnings = damage_of(&log, args.strict)?;
+    let (log, mut warnings) = checked(open(&args.log, options)?, args.strict)?;
     let destination = destination(args);
-    let channels = Topic::ALL.map(|topic| topic.channel(&config.output.prefix));
-    Appender::check(&log, &destination, &channels)?;
+    let usual = Encoding::of_profile(&log.index().profile);
+    let encoding = *config.output.encoding.get_or_insert(usual);
+    let all = Topic::channels(&Topic::written(encoding, true), &config.output.prefix, encoding);
+    Appender::check(&log, &destination, &all)?;
+    html_report::check(args, &log, &destination)?;
 
     let named = !config.source.is_empty();
-    let Recognised { unused, warnings: of_sources, bad_chunks, .. } = choose_sources(&log, &mut config)?;
+    let Recognised { unused, warnings: of_sources, mut damaged, .. } = choose_sources(&log, &mut config)?;
     warnings.extend(of_sources);
-    let Samples { mut loaded, origin, left_out, mut read } =
+    let Samples { mut loaded, origin, left_out, read } =
         source::load(&log, &config.source, named, config.output.origin)?;
-    ensure_whole(&mut read, &log, args)?;
+    damaged.extend(read.damaged);
+    ensure_whole(&mut damaged, &log, args)?;
     let known = |sentence: &String| warnings.contains(sentence);
     let left_out: Vec<String> = left_out.into_iter().filter(|sentence| !known(sentence)).collect();
     warnings.extend(left_out);
@@ -60,6 +63,13 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     config.source[datum].datum = true;
     // moved: copies would double what millions of samples take
     let sources: Vec<Source> = loaded.iter_mut().map(|l| std::mem::take(&mut l.source)).collect();
+    let geodetic = config.output.origin.map(|place| LocalFrame::new(Geodetic::from_degrees(place)));
+    let topics = Topic::written(encoding, geodetic.is_some());
+    let channels = Topic::channels(&topics, &config.output.prefix, encoding);
+    let compression = config.output.compression;
+    let begin = || Appender::begin(&log, &destination, &channels, compression);
+    // a new file's copy of the log gets on while the track is fitted; the log itself is not touched before it must be
+    let begun = if args.in_place { None } else { Some(begin()?) };
     bar.doing("fitting");
     let plan = resolve::plan(&mut config, &loaded, &sources, datum, origin, &mut warnings)?;
     let fusion = fusion::fuse(&sources, &plan)?;
@@ -75,7 +85,8 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
     warnings.extend(fusion.warnings.iter().cloned());
     let (input_name, output_name) =
         (args.log.display().to_string(), destination.path(&log).display().to_string());
-    let notes: Vec<String> = log.visibility().note().into_iter().collect();
+    let of_sources = loaded.iter().flat_map(|l| l.notes.iter().cloned());
+    let notes: Vec<String> = of_sources.chain(log.visibility().note()).chain(encoding.note(usual)).collect();
     let report = Report::new(&report::Parts {
         input: &input_name,
         output: &output_name,
@@ -100,38 +111,53 @@ pub fn fuse(args: &Fuse) -> Result<Outcome, CommandError> {
         t0,
         surface_at_zero: config.output.surface_at_zero == Some(true),
         log_start: resolve::log_start(&log, shift_s),
+        encoding,
+        geodetic,
     };
     let metadata = metadata(&log, &config, &report)?;
-    let mut appender = Appender::begin(&log, &destination, &channels, config.output.compression)?;
-    appender.leave_out(bad_chunks.into_iter().chain(read.bad_chunks()));
+    let parts = html::fusion::Parts { report: &report, fusion: &fusion, sources: &sources, origin, t0 };
+    let page = html_report::prepare(args, parts, &metadata)?;
+    let mut appender = begun.map_or_else(begin, Ok)?;
+    appender.leave_out(bad_chunks(&damaged));
     bar.doing("writing the track");
-    for message in messages(&fusion, context, &text, &warnings) {
-        appender.write(crate::log::NewMessage {
-            channel: message.topic as usize,
-            time_ns: message.time.plus_seconds(shift_s.unwrap_or(0.0)).to_log(),
-            data: &message.data,
-        })?;
-    }
-    appender.write_metadata(&metadata)?;
+    write(&mut appender, messages(&fusion, context, &text, &warnings), &topics, shift_s)?;
+    appender.add_metadata(metadata);
     appender.finish()?;
+    html_report::publish(page, &output_name)?;
     drop(bar);
-    let files = if args.in_place {
-        format!("{input_name}, in place")
-    } else {
-        format!("{input_name} -> {output_name}")
-    };
-    let text = format!("{files}\n\n{text}");
+    let text = format!("{}\n\n{text}", files(args, &input_name, &output_name));
     say(args.voice, &text, &report, &warnings);
     Ok(if warnings.is_empty() { Outcome::Done } else { Outcome::Warned })
 }
 
-/// Refuses damage that showed when the sources were read, where only a whole log will do.
-fn ensure_whole(read: &mut MessagesRead, log: &Log, args: &Fuse) -> Result<(), LogError> {
+/// What was read and what was written.
+fn files(args: &Fuse, input: &str, output: &str) -> String {
+    let log = if args.in_place { format!("{input}, in place") } else { format!("{input} -> {output}") };
+    args.report.as_ref().map_or(log.clone(), |page| format!("{log}, {}", page.display()))
+}
+
+/// Writes the messages of `topics`, whose channels are the appender's, on the log's clock.
+fn write(
+    appender: &mut Appender<'_>,
+    messages: impl Iterator<Item = Published>,
+    topics: &[Topic],
+    shift_s: Option<f64>,
+) -> Result<(), LogError> {
+    for message in messages {
+        let Some(channel) = topics.iter().position(|&topic| topic == message.topic) else { continue };
+        let time_ns = message.time.plus_seconds(shift_s.unwrap_or(0.0)).to_log();
+        appender.write(NewMessage { channel, time_ns, data: &message.data })?;
+    }
+    Ok(())
+}
+
+/// Refuses damage that showed when the sources were looked for and read, where only a whole log will do.
+fn ensure_whole(damaged: &mut Vec<LogError>, log: &Log, args: &Fuse) -> Result<(), LogError> {
     let bad = |error: &LogError| matches!(error, LogError::BadChunk { .. } | LogError::Damaged { .. });
-    let Some(first) = read.damaged.iter().position(bad).filter(|_| args.strict || args.in_place) else {
+    let Some(first) = damaged.iter().position(bad).filter(|_| args.strict || args.in_place) else {
         return Ok(());
     };
-    let error = read.damaged.swap_remove(first);
+    let error = damaged.swap_remove(first);
     if args.strict {
         return Err(error);
     }

@@ -1,11 +1,10 @@
 //! `trackfuse inspect`: log -> what is in it.
 
 use super::progress::Bar;
-use super::{CommandError, Outcome, open, show, warn};
+use super::{CommandError, Outcome, open, options, show, warn};
 use crate::cli::Inspect;
 use crate::config::Config;
 use crate::inspect::{inspect as look_into, verified};
-use crate::log::Work;
 use crate::log::verify::verify;
 use crate::report;
 
@@ -15,10 +14,7 @@ use crate::report;
 /// [`CommandError::Log`] for a log that can't be opened.
 pub fn inspect(args: &Inspect) -> Result<Outcome, CommandError> {
     let bar = Bar::new(args.voice);
-    let verification = args
-        .verify
-        .then(|| verify(&args.log, &mut |done, total| bar.observer().tell(Work::Read, done, total)))
-        .transpose()?;
+    let verification = args.verify.then(|| verify(&args.log, options(args.memory, &bar))).transpose()?;
     let (log, _) = open(&args.log, args.memory, false, &bar).inspect_err(|_| {
         // What a log that can't be opened has wrong with it is not for a report of what is in it.
         warn(args.voice, &verification.as_ref().map(verified::warnings).unwrap_or_default());

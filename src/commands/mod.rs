@@ -1,19 +1,24 @@
 //! The commands: each holds the order of its steps, and nothing else.
 
 mod compare;
+mod completions;
 mod export;
 mod fuse;
+mod html_report;
 mod init;
 mod inspect;
+mod man;
 mod progress;
 mod restore;
 mod simulate;
 
 pub use compare::compare;
-pub use export::export;
+pub use completions::completions;
+pub use export::{ExportError, export};
 pub use fuse::fuse;
 pub use init::init;
 pub use inspect::inspect;
+pub use man::man;
 pub use restore::restore;
 pub use simulate::simulate;
 
@@ -21,8 +26,10 @@ use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use anstyle::{AnsiColor, Style};
+
 use crate::cli::{Memory, Voice};
-use crate::config::ConfigError;
+use crate::config::{ConfigError, why_unread};
 use crate::estimate::EstimateError;
 use crate::log::{Log, LogError, ReadOptions};
 use crate::printable::printable;
@@ -31,6 +38,11 @@ use crate::simulate::SimulateError;
 use crate::source::SourceError;
 use crate::time::Time;
 use progress::Bar;
+
+/// How the words look that lines begin with, on terminals that show colours and where `NO_COLOR` is not set.
+const ERROR: Style = AnsiColor::Red.on_default().bold();
+const WARNING: Style = AnsiColor::Yellow.on_default().bold();
+const HINT: Style = AnsiColor::Cyan.on_default().bold();
 
 /// How a command ended that did what it should.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,6 +88,9 @@ pub enum CommandError {
         /// When the reference is.
         reference: String,
     },
+    /// The track can't be had in a format.
+    #[error(transparent)]
+    Export(#[from] ExportError),
     /// A scenario, with its file.
     #[error("{path}: {error}")]
     Scenario {
@@ -87,8 +102,22 @@ pub enum CommandError {
     /// What was found can't be printed.
     #[error("the result can't be printed: {0}")]
     Print(io::Error),
-    /// A file that is no log.
-    #[error("{path}: {source}")]
+    /// Two outputs would bear one name.
+    #[error("the log and its report can't both be {path:?}")]
+    OneName {
+        /// That name.
+        path: PathBuf,
+    },
+    /// The log is written, and its report can't get its name.
+    #[error("{log} is written, but its report is not: {source}")]
+    ReportLost {
+        /// The log.
+        log: String,
+        /// Why the report isn't.
+        source: LogError,
+    },
+    /// A scenario that can't be read.
+    #[error("scenario {path}: {}", why_unread(source))]
     File {
         /// The file.
         path: String,
@@ -106,6 +135,10 @@ impl CommandError {
             Self::Log(error) => error.hint(),
             Self::Source(error) => error.hint(),
             Self::Resolve(error) => Some(error.hint()),
+            Self::Export(error) => Some(error.hint().into()),
+            Self::File { .. } => {
+                Some("a scenario is a TOML file, such as `sample_logs/steep_climb.scenario.toml`".into())
+            }
             Self::NothingInCommon { .. } => {
                 Some("`--reference-time log` takes the reference's log times instead of its stamps".into())
             }
@@ -117,14 +150,20 @@ impl CommandError {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         let usage = match self {
-            Self::Config(_) | Self::Resolve(_) | Self::File { .. } => true,
+            Self::Config(_)
+            | Self::Resolve(_)
+            | Self::OneName { .. }
+            | Self::Export(_)
+            | Self::File { .. } => true,
             Self::Source(SourceError::Log(error)) | Self::Log(error) => is_usage(error),
             Self::Source(error) => error.is_usage(),
             Self::Simulate(error) => is_of_scenario(error),
             Self::Scenario { error, .. } => is_of_scenario(error),
-            Self::Print(_) | Self::Estimate(_) | Self::NotFinite { .. } | Self::NothingInCommon { .. } => {
-                false
-            }
+            Self::Print(_)
+            | Self::Estimate(_)
+            | Self::NotFinite { .. }
+            | Self::ReportLost { .. }
+            | Self::NothingInCommon { .. } => false,
         };
         if usage { 2 } else { 1 }
     }
@@ -153,28 +192,32 @@ impl From<Outcome> for ExitCode {
 /// Opens a command's log, and says what is wrong with it; refuses it then where only a whole one will do. `bar`
 /// shows how long work on it gets on.
 fn open(path: &Path, memory: Memory, strict: bool, bar: &Bar) -> Result<(Log, Vec<String>), LogError> {
-    let (memory_limit, observer) = (memory.memory_limit, bar.observer());
-    let log = Log::open_with(path, ReadOptions { memory_limit, observer, ..ReadOptions::default() })?;
-    let warnings = damage_of(&log, strict)?;
-    Ok((log, warnings))
+    checked(Log::open_with(path, options(memory, bar))?, strict)
 }
 
-/// What is wrong with a log; refuses it where only a whole one will do.
-fn damage_of(log: &Log, strict: bool) -> Result<Vec<String>, LogError> {
+/// How a command reads its log; `bar` shows how long work on it gets on.
+fn options(memory: Memory, bar: &Bar) -> ReadOptions {
+    let (memory_limit, observer) = (memory.memory_limit, bar.observer());
+    ReadOptions { memory_limit, observer, ..ReadOptions::default() }
+}
+
+/// A log with what is wrong with it; refuses it where only a whole one will do.
+fn checked(log: Log, strict: bool) -> Result<(Log, Vec<String>), LogError> {
     if strict {
-        log.ensure_whole()?;
+        log.ensure_as_summed_up()?;
     }
-    Ok(log.damage_warnings())
+    let warnings = log.damage_warnings();
+    Ok((log, warnings))
 }
 
 /// Prints why a command wrote nothing, and what to do about it, on stderr.
 pub fn explain(error: &CommandError) {
-    let mut stderr = io::stderr().lock();
+    let mut stderr = anstream::stderr().lock();
     let text = error.to_string();
     let lines: Vec<_> = text.lines().map(printable).collect();
-    let _ = writeln!(stderr, "error: {}", lines.join("\n"));
+    let _ = writeln!(stderr, "{ERROR}error:{ERROR:#} {}", lines.join("\n"));
     if let Some(hint) = error.hint() {
-        let _ = writeln!(stderr, "hint: {hint}");
+        let _ = writeln!(stderr, "{HINT}hint:{HINT:#} {hint}");
     }
 }
 
@@ -188,7 +231,7 @@ fn beside(log: &Path, what: &str) -> PathBuf {
 /// Prints what is worth knowing, and no reason to look into it.
 fn note(voice: Voice, text: &str) {
     if !voice.quiet {
-        let _ = writeln!(io::stderr(), "note: {}", printable(text));
+        let _ = writeln!(anstream::stderr(), "{HINT}note:{HINT:#} {}", printable(text));
     }
 }
 
@@ -196,8 +239,8 @@ fn note(voice: Voice, text: &str) {
 fn say(voice: Voice, text: &str, json: &impl serde::Serialize, warnings: &[String]) {
     if let Err(error) = print(voice, text, json, warnings) {
         let _ = writeln!(
-            io::stderr(),
-            "warning: the output is written, but its summary can't be printed: {error}"
+            anstream::stderr(),
+            "{WARNING}warning:{WARNING:#} the output is written, but its summary can't be printed: {error}"
         );
     }
 }
@@ -225,7 +268,7 @@ fn print(
         let json = serde_json::to_string_pretty(json).unwrap_or_default();
         writeln!(stdout, "{json}")
     } else {
-        write!(stdout, "{text}")
+        write!(anstream::AutoStream::auto(&mut stdout), "{}", coloured(text))
     };
     if voice.json || !stdout.is_terminal() {
         warn(voice, warnings);
@@ -237,12 +280,27 @@ fn print(
     }
 }
 
+/// The text, with what a person must read of it in colour.
+fn coloured(text: &str) -> String {
+    text.replace("\nwarning:", &format!("\n{WARNING}warning:{WARNING:#}"))
+}
+
+/// Prints bytes that are for other programs on stdout.
+fn put(bytes: &[u8]) -> Result<(), CommandError> {
+    let mut stdout = io::stdout().lock();
+    match stdout.write_all(bytes).and_then(|()| stdout.flush()) {
+        // a reader that went away wants no more
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(CommandError::Print(error)),
+        _ => Ok(()),
+    }
+}
+
 /// Prints warnings on stderr, unless nobody wants them there.
 fn warn(voice: Voice, warnings: &[String]) {
     if !voice.quiet {
-        let mut stderr = io::stderr().lock();
+        let mut stderr = anstream::stderr().lock();
         for warning in warnings {
-            let _ = writeln!(stderr, "warning: {}", printable(warning));
+            let _ = writeln!(stderr, "{WARNING}warning:{WARNING:#} {}", printable(warning));
         }
     }
 }

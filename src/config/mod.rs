@@ -4,6 +4,8 @@
 //! metadata, so that a track can be made again.
 
 mod check;
+#[cfg(test)]
+mod guide;
 mod template;
 
 pub use template::{SourceTable, template};
@@ -15,13 +17,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::estimate::registration::{Kind, Priors};
 use crate::estimate::{Coefficients, Estimator};
-use crate::log::Compression;
+use crate::log::{Compression, Encoding};
 
 /// Why a config can't be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
     /// The file can't be read.
-    #[error("config {path}: {source}")]
+    #[error("config {path}: {}", why_unread(source))]
     Read {
         /// The file.
         path: PathBuf,
@@ -55,12 +57,24 @@ impl ConfigError {
     #[must_use]
     pub fn hint(&self) -> Option<String> {
         match self {
+            Self::Read { .. } => {
+                Some("a config is a TOML file: `trackfuse init LOG -o CONFIG` writes one".into())
+            }
             Self::Syntax { nearest: Some(key), .. } => Some(format!("did you mean `{key}`?")),
             Self::Syntax { message, .. } if message.ends_with("expected a list of tables") => {
                 Some("two brackets begin an entry of a list: `[[source]]`, `[[characteristic_point]]`".into())
             }
             _ => None,
         }
+    }
+}
+
+/// Why a file gave no text.
+pub(crate) fn why_unread(error: &std::io::Error) -> String {
+    match error.kind() {
+        std::io::ErrorKind::InvalidData => "it is no text".into(),
+        std::io::ErrorKind::IsADirectory => "it is a directory".into(),
+        _ => error.to_string(),
     }
 }
 
@@ -101,6 +115,10 @@ pub struct Output {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(example = [42.3758, -71.1474, 7.3])]
     pub origin: Option<[f64; 3]>,
+    /// What the new messages are encoded in; default: `cdr` where the log's profile is `ros2`, else `json`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = &"protobuf")]
+    pub encoding: Option<Encoding>,
     /// Compression of the new chunks.
     pub compression: Compression,
     /// T0, from which times count, ns; default: the datum's first sample.
@@ -121,6 +139,7 @@ impl Default for Output {
             rate_hz: None,
             frame_id: None,
             origin: None,
+            encoding: None,
             compression: Compression::Zstd,
             t0_ns: None,
             surface_at_zero: None,
@@ -162,7 +181,9 @@ pub struct SourceConfig {
     pub time: Option<TimeChoice>,
     /// How long before its time a sample was taken, s.
     pub latency_s: f64,
-    /// Added to every position, m: the vector, in the track's frame, from what is measured to what is tracked.
+    /// Lever arm, added to every position, m: the vector from what is measured to what is tracked, along the axes of the
+    /// vehicle's body, turned by the orientation beside the position; along the track's axes where there is none. A
+    /// velocity is taken as it is: what the vehicle's turning adds to it along the lever arm is not taken off.
     pub offset_m: [f64; 3],
     /// Frame of its velocities; default: `body` for `nav_msgs/Odometry` and `foxglove.Odometry`, else `world`.
     #[serde(skip_serializing_if = "Option::is_none")]

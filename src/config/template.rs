@@ -135,7 +135,7 @@ fn commented_key(key: &str, property: &Value) -> String {
 }
 
 /// What a key means, and which values it can have where those are words.
-fn meaning(schema: &Value, property: &Value) -> String {
+pub(super) fn meaning(schema: &Value, property: &Value) -> String {
     let mut text = sentence(property);
     let optional = property.get("anyOf").and_then(|list| list.get(0));
     let words = &resolved(schema, optional.unwrap_or(property))["oneOf"];
@@ -152,12 +152,12 @@ fn meaning(schema: &Value, property: &Value) -> String {
 }
 
 /// A definition itself, where it stands elsewhere.
-fn resolved<'a>(schema: &'a Value, definition: &'a Value) -> &'a Value {
+pub(super) fn resolved<'a>(schema: &'a Value, definition: &'a Value) -> &'a Value {
     let name = definition["$ref"].as_str().and_then(|r| r.strip_prefix("#/$defs/"));
     name.map_or(definition, |name| &schema["$defs"][name])
 }
 
-fn sentence(definition: &Value) -> String {
+pub(super) fn sentence(definition: &Value) -> String {
     definition["description"].as_str().unwrap_or_default().replace('\n', " ")
 }
 

@@ -6,7 +6,7 @@ use super::Plan;
 use super::pieces::{instants, warn_of_lost, within};
 use crate::estimate::agreement::{self, Disagreement};
 use crate::estimate::coverage::Coverage;
-use crate::estimate::registration::{Kind, Name, Registered, Separation, register};
+use crate::estimate::registration::{Kind, Mirrored, Name, Registered, Separation, register};
 use crate::estimate::{EstimateError, spline};
 use crate::sample::{Quantity, Source};
 use crate::track::{Curve, State};
@@ -92,6 +92,19 @@ pub(super) fn warn(
         warnings.push(format!(
             "the registration has not converged in {} steps: look at its numbers before you use them",
             registered.iterations
+        ));
+    }
+    for (source, mirrored) in sources.iter().zip(&registered.mirrored) {
+        let Some(mirrored) = mirrored else { continue };
+        let what = match mirrored {
+            Mirrored::Ned => "as north, east, down: say `axes = \"ned\"` for this source if that is so",
+            Mirrored::Level => "with x and y exchanged, or one of them turned over",
+            Mirrored::Vertical => "with z turned over",
+        };
+        warnings.push(format!(
+            "{} is left out: its positions are mirrored against the datum's, which no rotation mends; they would fit far \
+             better {what}",
+            source.name
         ));
     }
     for (s, source) in sources.iter().enumerate() {

@@ -15,7 +15,7 @@ pub mod verified;
 use std::collections::BTreeMap;
 
 use crate::config::SourceConfig;
-use crate::log::{Excerpt, Index, Log, TimesRead};
+use crate::log::{Encoding, Excerpt, Index, Log, TimesRead};
 use crate::publish::Topic;
 use crate::report::inspection::{
     ChecksumReport, ClocksRead, CompressionReport, FileReport, FuseReport, IndexReport, Inspection,
@@ -181,7 +181,9 @@ fn fuse(log: &Log, recognised: Result<&Recognised, &SourceError>, prefix: &str) 
         }
         other => (other.to_string(), 0),
     });
-    let new = Topic::ALL.map(|topic| topic.channel(prefix).topic);
+    let encoding = Encoding::of_profile(&log.index().profile);
+    let new = Topic::written(encoding, true).into_iter().map(|topic| topic.channel(prefix, encoding).topic);
+    let new: Vec<String> = new.collect();
     let taken_topic = new.iter().find(|topic| log.index().channels_of(topic).next().is_some());
     let taken_topic = taken_topic.map(|t| format!("{t} is in the log already: `--prefix` names others"));
     let choosing = unclear.as_ref().is_some_and(|(_, candidates)| *candidates > 0);

@@ -28,14 +28,62 @@ impl NewChannel {
     /// A channel of JSON messages that follow a JSON Schema.
     #[must_use]
     pub fn json(topic: &str, schema_name: &str, schema: &str) -> Self {
+        Self::new(topic, "json", [schema_name, "jsonschema"], schema.as_bytes())
+    }
+
+    /// A channel of protobuf messages; `descriptors` are a serialized `FileDescriptorSet` of all that they use.
+    #[must_use]
+    pub fn protobuf(topic: &str, schema_name: &str, descriptors: &[u8]) -> Self {
+        Self::new(topic, "protobuf", [schema_name, "protobuf"], descriptors)
+    }
+
+    /// A channel of ROS 2 messages in CDR, with their definition and those of all that it uses.
+    #[must_use]
+    pub fn ros2(topic: &str, schema_name: &str, definition: &str) -> Self {
+        let channel = Self::new(topic, "cdr", [schema_name, "ros2msg"], definition.as_bytes());
+        // the profile wants it; empty: whoever plays it chooses
+        let metadata = [("offered_qos_profiles".to_owned(), String::new())].into();
+        Self { metadata, ..channel }
+    }
+
+    fn new(topic: &str, encoding: &str, [schema_name, schema_encoding]: [&str; 2], schema: &[u8]) -> Self {
         Self {
             topic: topic.to_owned(),
-            message_encoding: "json".to_owned(),
+            message_encoding: encoding.to_owned(),
             schema_name: schema_name.to_owned(),
-            schema_encoding: "jsonschema".to_owned(),
-            schema: schema.as_bytes().to_vec(),
+            schema_encoding: schema_encoding.to_owned(),
+            schema: schema.to_vec(),
             metadata: BTreeMap::new(),
         }
+    }
+}
+
+/// What new messages are encoded in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Encoding {
+    /// Foxglove's messages and ours as JSON.
+    #[default]
+    Json,
+    /// The same as protobuf, which Rerun draws too.
+    Protobuf,
+    /// ROS 2 messages, such as `nav_msgs/Odometry`, in CDR.
+    Cdr,
+}
+
+impl Encoding {
+    /// The encoding of a log of this profile unless somebody wants another one: `ros2` allows CDR alone.
+    #[must_use]
+    pub fn of_profile(profile: &str) -> Self {
+        if profile == "ros2" { Self::Cdr } else { Self::Json }
+    }
+
+    /// What a person may want to know of messages in this encoding in a log whose profile makes another one usual.
+    #[must_use]
+    pub fn note(self, usual: Self) -> Option<String> {
+        let lost = "the log's profile is ros2, which has messages in CDR only: tools that go by it may not read the log \
+                    with the new ones";
+        (usual == Self::Cdr && self != usual).then(|| lost.to_owned())
     }
 }
 

@@ -1,30 +1,20 @@
 //! A log's successor: its data section byte for byte, new chunks behind it, a summary of both.
 
-use std::{
-    borrow::Cow,
-    collections::{BTreeMap, BTreeSet},
-    path::PathBuf,
-};
+use std::{borrow::Cow, collections::BTreeSet, path::PathBuf};
 
-use mcap::records::{
-    Channel, ChunkHeader, ChunkIndex, DataEnd, MessageHeader, MessageIndex, MessageIndexEntry, MetadataIndex,
-    SchemaHeader, Statistics, op,
-};
+use mcap::records::{Channel, DataEnd, MessageHeader, MetadataIndex, SchemaHeader, Statistics, op};
 
 use super::addition::{Compression, NewChannel, NewMessage, NewMetadata};
 use super::contents::count;
 use super::file::parse;
 use super::ids::{Ids, assign_ids};
 use super::index::SummaryRecord;
+use super::new_chunk::Chunk;
 use super::output::{Destination, Sink};
 use super::rescue::{left_of_cut_chunk, lost_message_indexes};
 use super::summary::{self, encode, encode_body, encode_bytes};
 use super::{Index, Log, LogError, Visibility, chunk, old_tail};
 
-/// A viewer's seek then loads at most this much more than before.
-const CHUNK_BYTES: usize = 4_000_000;
-/// And at most this much log time.
-const CHUNK_NS: u64 = 30_000_000_000;
 const PIECE: u64 = 1 << 20;
 
 /// What was written.
@@ -53,6 +43,7 @@ pub struct Appender<'a> {
     summary: Vec<SummaryRecord>,
     statistics: Statistics,
     messages: u64,
+    metadata: Vec<NewMetadata>,
     /// How readers will find it all.
     visibility: Visibility,
     /// Chunks of the log that can't be decoded.
@@ -60,8 +51,8 @@ pub struct Appender<'a> {
 }
 
 impl<'a> Appender<'a> {
-    /// Starts the successor of `log`, with all `channels`, and copies the data section of one that is a new
-    /// file. All checks come before the copy.
+    /// Starts the successor of `log`, with all `channels`. The data section of one that is a new file is copied
+    /// from now on, beside other work, until [`Appender::finish`]. All checks come before the copy.
     ///
     /// # Errors
     /// [`LogError::OutputIsInput`]; [`LogError::OutputExists`] unless forced; [`LogError::NotInPlace`];
@@ -85,12 +76,14 @@ impl<'a> Appender<'a> {
             summary: Vec::new(),
             statistics: statistics_of(&old),
             messages: 0,
+            metadata: Vec::new(),
             old,
             visibility: if is_sidecar { Visibility::Indexed } else { log.visibility() },
             left_out: BTreeSet::new(),
         };
         if is_sidecar {
-            appender.put(&summary::start())?;
+            let is_ros2 = !channels.is_empty() && channels.iter().all(|c| c.schema_encoding == "ros2msg");
+            appender.put(&summary::start(if is_ros2 { "ros2" } else { "" }))?;
         } else {
             appender.complete_torn_chunk(log)?;
             appender.keep_old_tail()?;
@@ -144,12 +137,13 @@ impl<'a> Appender<'a> {
         self.left_out.extend(chunk_starts);
     }
 
-    /// Adds a metadata record.
-    ///
-    /// # Errors
-    /// As [`Appender::write`].
-    pub fn write_metadata(&mut self, metadata: &NewMetadata) -> Result<(), LogError> {
-        let NewMetadata { name, entries } = metadata.clone();
+    /// Adds a metadata record, which will stand behind all messages. Its name should begin with `trackfuse:`: the
+    /// way back takes records of other names, and what stands behind the last of these, for another program's.
+    pub fn add_metadata(&mut self, metadata: NewMetadata) {
+        self.metadata.push(metadata);
+    }
+
+    fn put_metadata(&mut self, NewMetadata { name, entries }: NewMetadata) -> Result<(), LogError> {
         let record = encode(op::METADATA, &mcap::records::Metadata { name: name.clone(), metadata: entries });
         let entry = MetadataIndex { offset: self.sink.position, length: record.len() as u64, name };
         self.put(&record)?;
@@ -164,6 +158,9 @@ impl<'a> Appender<'a> {
     /// As [`Appender::write`]; [`LogError::OutputExists`] when somebody else made the output meanwhile.
     pub fn finish(mut self) -> Result<Written, LogError> {
         self.end_chunk()?;
+        for metadata in std::mem::take(&mut self.metadata) {
+            self.put_metadata(metadata)?;
+        }
         let end = DataEnd { data_section_crc: self.sink.data_crc() };
         self.put(&encode(op::DATA_END, &end))?;
         let start = self.sink.position;
@@ -272,41 +269,13 @@ impl<'a> Appender<'a> {
 
     fn end_chunk(&mut self) -> Result<(), LogError> {
         let chunk = std::mem::take(&mut self.chunk);
-        if chunk.records.is_empty() {
+        if chunk.is_empty() {
             return Ok(());
         }
-        let compressed = self
-            .compression
-            .compress(&chunk.records)
+        let (records, entry) = chunk
+            .pack(self.compression, self.sink.position)
             .map_err(|source| LogError::Write { path: self.out.clone(), source })?;
-        let header = ChunkHeader {
-            message_start_time: chunk.start,
-            message_end_time: chunk.end,
-            uncompressed_size: chunk.records.len() as u64,
-            uncompressed_crc: crc32fast::hash(&chunk.records),
-            compression: self.compression.name().to_owned(),
-            compressed_size: compressed.len() as u64,
-        };
-        let chunk_start_offset = self.sink.position;
-        self.put(&encode_bytes(op::CHUNK, &[&encode_body(&header), &compressed]))?;
-        let chunk_end = self.sink.position;
-        let mut message_index_offsets = BTreeMap::new();
-        for (channel_id, mut records) in chunk.index {
-            records.sort_by_key(|entry| entry.log_time);
-            message_index_offsets.insert(channel_id, self.sink.position);
-            self.put(&encode(op::MESSAGE_INDEX, &MessageIndex { channel_id, records }))?;
-        }
-        let entry = ChunkIndex {
-            message_start_time: chunk.start,
-            message_end_time: chunk.end,
-            chunk_start_offset,
-            chunk_length: chunk_end - chunk_start_offset,
-            message_index_offsets,
-            message_index_length: self.sink.position - chunk_end,
-            compression: header.compression,
-            compressed_size: header.compressed_size,
-            uncompressed_size: header.uncompressed_size,
-        };
+        self.put(&records)?;
         self.summarize(op::CHUNK_INDEX, encode(op::CHUNK_INDEX, &entry));
         self.statistics.chunk_count += 1;
         Ok(())
@@ -343,206 +312,5 @@ fn statistics_of(index: &Index) -> Statistics {
     statistics
 }
 
-/// The messages of the chunk that is being filled.
-#[derive(Debug, Default)]
-struct Chunk {
-    records: Vec<u8>,
-    index: BTreeMap<u16, Vec<MessageIndexEntry>>,
-    start: u64,
-    end: u64,
-}
-
-impl Chunk {
-    fn has_room(&self, time: u64, len: usize) -> bool {
-        self.records.is_empty()
-            || self.records.len() + len <= CHUNK_BYTES
-                && self.end.max(time) - self.start.min(time) <= CHUNK_NS
-    }
-
-    fn push(&mut self, header: &MessageHeader, record: &[u8]) {
-        let time = header.log_time;
-        (self.start, self.end) =
-            if self.records.is_empty() { (time, time) } else { (self.start.min(time), self.end.max(time)) };
-        let entry = MessageIndexEntry { log_time: time, offset: self.records.len() as u64 };
-        self.index.entry(header.channel_id).or_default().push(entry);
-        self.records.extend_from_slice(record);
-    }
-}
-
 #[cfg(test)]
-mod tests {
-    use std::{fs, path::Path};
-
-    use super::super::file::parse;
-    use super::super::fixture::{PRIVATE, chunked, log, names_in, on_disk, records};
-    use super::*;
-
-    fn channel(topic: &str) -> NewChannel {
-        NewChannel::json(topic, "trackfuse.Test", "{}")
-    }
-
-    fn to(out: &Path, force: bool) -> Destination {
-        Destination::New { out: out.to_owned(), force }
-    }
-
-    fn append(log: &Log, out: &Path, force: bool, compression: Compression) -> Result<Written, LogError> {
-        let mut appender = Appender::begin(log, &to(out, force), &[channel("/fused/track")], compression)?;
-        for i in 0..100_u64 {
-            let data = i.to_string();
-            appender.write(NewMessage { channel: 0, time_ns: i * 1_000_000_000, data: data.as_bytes() })?;
-        }
-        appender.finish()
-    }
-
-    #[test]
-    fn the_same_input_gives_the_same_bytes() {
-        let (dir, path) = on_disk(&log(chunked()));
-        let log = Log::open(&path).unwrap();
-        for compression in [Compression::Zstd, Compression::Lz4, Compression::None] {
-            let outs = ["1", "2"].map(|name| dir.path().join(name));
-            let [a, b] = outs.map(|out| {
-                append(&log, &out, true, compression).unwrap();
-                fs::read(out).unwrap()
-            });
-            assert!(a == b, "{compression:?}");
-        }
-    }
-
-    #[test]
-    fn an_existing_output_is_refused_and_kept_unless_forced() {
-        let (dir, path) = on_disk(&log(chunked()));
-        let log = Log::open(&path).unwrap();
-        let out = dir.path().join("out.mcap");
-        fs::write(&out, "precious").unwrap();
-        // At the start, not after an hour of copying.
-        let refused =
-            Appender::begin(&log, &Destination::new_file(&out), &[], Compression::Zstd).unwrap_err();
-        assert!(matches!(refused, LogError::OutputExists { .. }) && refused.hint().is_some(), "{refused}");
-        assert_eq!(fs::read(&out).unwrap(), b"precious");
-        assert_eq!(names_in(dir.path()), ["in.mcap", "out.mcap"]);
-        let written = append(&log, &out, true, Compression::Zstd).unwrap();
-        assert_eq!((written.len, written.messages), (fs::metadata(&out).unwrap().len(), 100));
-    }
-
-    #[test]
-    fn an_output_made_by_another_meanwhile_is_kept() {
-        let (dir, path) = on_disk(&log(chunked()));
-        let log = Log::open(&path).unwrap();
-        let out = dir.path().join("out.mcap");
-        let appender = Appender::begin(&log, &Destination::new_file(&out), &[], Compression::Zstd).unwrap();
-        fs::write(&out, "precious").unwrap();
-        assert!(matches!(appender.finish(), Err(LogError::OutputExists { .. })));
-        assert_eq!(fs::read(&out).unwrap(), b"precious");
-        assert_eq!(names_in(dir.path()), ["in.mcap", "out.mcap"]);
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn the_input_is_never_the_output_through_any_link() {
-        let (dir, path) = on_disk(&log(chunked()));
-        let log = Log::open(&path).unwrap();
-        let [soft, hard] = ["soft", "hard"].map(|name| dir.path().join(name));
-        std::os::unix::fs::symlink(&path, &soft).unwrap();
-        fs::hard_link(&path, &hard).unwrap();
-        for out in [&path, &soft, &hard] {
-            let refused = append(&log, out, true, Compression::Zstd);
-            assert!(matches!(refused, Err(LogError::OutputIsInput { .. })), "{out:?}: {refused:?}");
-        }
-        assert_eq!(names_in(dir.path()), ["hard", "in.mcap", "soft"]);
-    }
-
-    #[test]
-    fn nothing_remains_of_an_output_that_was_not_finished() {
-        let (dir, path) = on_disk(&log(chunked()));
-        let log = Log::open(&path).unwrap();
-        let out = dir.path().join("out.mcap");
-        let begin = |out: &Path, channels: &[NewChannel]| {
-            Appender::begin(&log, &Destination::new_file(out), channels, Compression::Zstd)
-        };
-        let mut given_up = begin(&out, &[channel("/x")]).unwrap();
-        given_up.write(NewMessage { channel: 0, time_ns: 1, data: b"1" }).unwrap();
-        drop(given_up);
-        assert!(matches!(begin(&out, &[channel("/a")]), Err(LogError::TopicTaken { .. })));
-        assert!(matches!(begin(&out, &[channel("/x"), channel("/x")]), Err(LogError::TopicTaken { .. })));
-        assert!(matches!(begin(&dir.path().join("no/such"), &[]), Err(LogError::Write { .. })));
-        assert_eq!(names_in(dir.path()), ["in.mcap"]);
-    }
-
-    #[test]
-    fn new_chunks_are_short_in_time_and_small() {
-        let (dir, path) = on_disk(&log(chunked()));
-        let log = Log::open(&path).unwrap();
-        let out = dir.path().join("out.mcap");
-        let mut appender =
-            Appender::begin(&log, &Destination::new_file(&out), &[channel("/x")], Compression::Zstd).unwrap();
-        let large = vec![b' '; 1_500_000];
-        for i in 0..100_u64 {
-            let data: &[u8] = if i < 10 { &large } else { b"1" };
-            appender.write(NewMessage { channel: 0, time_ns: i * 1_000_000_000, data }).unwrap();
-        }
-        appender.finish().unwrap();
-        let written = Log::open(&out).unwrap();
-        let (old, new) = written.index().chunks.split_at(log.index().chunks.len());
-        assert_eq!(old, log.index().chunks);
-        // Two of the large ones fit into one chunk, and 31 of the small ones into 30 s.
-        assert_eq!(new.len(), 7);
-        for chunk in new {
-            assert!(chunk.uncompressed_size <= CHUNK_BYTES as u64, "{chunk:?}");
-            assert!(chunk.message_end_time - chunk.message_start_time <= CHUNK_NS, "{chunk:?}");
-        }
-    }
-
-    #[test]
-    fn every_entry_of_a_new_message_index_leads_to_its_message() {
-        let (dir, path) = on_disk(&log(chunked()));
-        let log = Log::open(&path).unwrap();
-        let out = dir.path().join("out.mcap");
-        let channels = [channel("/x"), channel("/y")];
-        let mut appender =
-            Appender::begin(&log, &Destination::new_file(&out), &channels, Compression::None).unwrap();
-        for i in 0..40 {
-            // Not in the order of time, as messages of several channels may come.
-            appender.write(NewMessage { channel: i % 2, time_ns: (i as u64 * 7) % 40, data: b"{}" }).unwrap();
-        }
-        appender.finish().unwrap();
-        let (output, written) = (fs::read(&out).unwrap(), Log::open(&out).unwrap());
-        let chunk = written.index().chunks.last().unwrap();
-        let content = &output[chunk.compressed_data_offset().unwrap() as usize..];
-        let mut entries = 0;
-        for (&channel_id, &at) in &chunk.message_index_offsets {
-            let index: MessageIndex = parse(&output[at as usize + 9..]).unwrap();
-            assert!(index.records.is_sorted_by_key(|entry| entry.log_time));
-            for entry in index.records {
-                let message: MessageHeader = parse(&content[entry.offset as usize + 9..]).unwrap();
-                assert_eq!(content[entry.offset as usize], op::MESSAGE);
-                assert_eq!((message.channel_id, message.log_time), (channel_id, entry.log_time));
-                entries += 1;
-            }
-        }
-        assert_eq!(entries, 40);
-    }
-
-    #[test]
-    fn records_of_others_and_a_missing_crc_stay_as_they_are() {
-        let mut bytes = log(chunked().calculate_data_section_crc(false).calculate_summary_section_crc(false));
-        // A record of somebody's own in the summary too, in place of the summary offsets.
-        let (_, offsets) =
-            records(&bytes).into_iter().find(|&(opcode, _)| opcode == op::SUMMARY_OFFSET).unwrap();
-        let private = encode_bytes(PRIVATE + 1, &[b"in the summary"]);
-        bytes.splice(offsets..offsets, private.iter().copied());
-        let offset_start = bytes.len() - 8 - 12;
-        bytes[offset_start..offset_start + 8]
-            .copy_from_slice(&((offsets + private.len()) as u64).to_le_bytes());
-
-        let (dir, path) = on_disk(&bytes);
-        let log = Log::open(&path).unwrap();
-        let out = dir.path().join("out.mcap");
-        append(&log, &out, false, Compression::Zstd).unwrap();
-        let output = fs::read(&out).unwrap();
-        let found = records(&output);
-        assert!(found.iter().any(|&(opcode, _)| opcode == PRIVATE));
-        let &(_, at) = found.iter().find(|&&(opcode, _)| opcode == PRIVATE + 1).unwrap();
-        assert_eq!(output[at..at + private.len()], private);
-        assert_eq!(Log::open(&out).unwrap().index().data_section_crc, None);
-    }
-}
+mod tests;

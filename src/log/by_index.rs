@@ -30,18 +30,24 @@ impl Log {
         let index = self.index();
         let uncompressed = index.chunks.iter().any(|c| c.compression.is_empty());
         let Some(statistics) = index.statistics.as_ref().filter(|_| uncompressed) else { return false };
-        let Some(mut counts) = self.loose_messages(channels) else { return false };
-        for chunk in &index.chunks {
-            if chunk.message_index_offsets.is_empty() && chunk.uncompressed_size > 0 {
-                return false;
-            }
-            for (&id, &offset) in chunk.message_index_offsets.iter().filter(|(id, _)| channels.contains(id)) {
-                let Some(count) = self.indexed_messages(id, offset) else { return false };
-                *counts.entry(id).or_default() += count;
-            }
-        }
+        let Some(counts) = self.counted_by_index(channels) else { return false };
         let counted = |id| statistics.channel_message_counts.get(id).copied().unwrap_or(0);
         channels.iter().all(|id| counts.get(id).copied().unwrap_or(0) == counted(id))
+    }
+
+    /// How many messages of each of `channels` the message indexes name, and stand outside chunks; `None` where a
+    /// chunk has no message index.
+    pub(super) fn counted_by_index(&self, channels: &BTreeSet<u16>) -> Option<BTreeMap<u16, u64>> {
+        let mut counts = self.loose_messages(channels)?;
+        for chunk in &self.index().chunks {
+            if chunk.message_index_offsets.is_empty() && chunk.uncompressed_size > 0 {
+                return None;
+            }
+            for (&id, &offset) in chunk.message_index_offsets.iter().filter(|(id, _)| channels.contains(id)) {
+                *counts.entry(id).or_default() += self.indexed_messages(id, offset)?;
+            }
+        }
+        Some(counts)
     }
 
     /// How many messages of each channel stand outside chunks; `None` where that is too much to be counted.
@@ -176,7 +182,7 @@ mod tests {
     use mcap::records::MessageHeader;
 
     use super::super::fixture::{on_disk, records};
-    use super::super::{LogError, MessagesRead, OwnedMessage, ReadOptions};
+    use super::super::{LogError, MessagesRead, OwnedMessage, ReadOptions, bad_chunks};
     use super::*;
 
     /// The channels, then chunks of ten frames of 100 KB (channel 0), with a short message on 1 at each and a longer one on 2 at some.
@@ -241,7 +247,7 @@ mod tests {
         let (found, read) = read_all(&bytes, false);
         assert!(found.len() == 67 && read.unchecked == read.parts - 1 && read.damaged.is_empty());
         let (found, read) = read_all(&bytes, true);
-        assert!(found.len() < 67 && read.bad_chunks().len() == 1, "{read:?}");
+        assert!(found.len() < 67 && bad_chunks(&read.damaged).len() == 1, "{read:?}");
     }
 
     #[test]
@@ -252,7 +258,7 @@ mod tests {
             let head = position(&bytes, b"a7") - 31;
             bytes[head + at] = value;
             let (found, read) = read_all(&bytes, false);
-            assert_eq!((read.bad_chunks().len(), read.unchecked), (1, read.parts - 2), "byte {at}");
+            assert_eq!((bad_chunks(&read.damaged).len(), read.unchecked), (1, read.parts - 2), "byte {at}");
             assert!(found.iter().all(|m| m.data != b"a7"), "byte {at}");
         }
     }

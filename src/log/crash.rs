@@ -267,3 +267,51 @@ fn what_was_saved_of_another_log_or_is_damaged_is_not_put_back() {
     put_back(&trial.path).unwrap();
     assert!(trial.now() == trial.original);
 }
+
+/// What another program does that writes the log anew.
+fn replace(path: &Path) {
+    let other = path.with_file_name("other.mcap");
+    fs::write(&other, "another file").unwrap();
+    fs::rename(other, path).unwrap();
+}
+
+#[cfg(unix)]
+#[test]
+fn a_log_whose_name_another_file_took_is_not_said_to_be_added_to() {
+    let trial = Trial::new();
+    let log = Log::open_in_place(&trial.path).unwrap();
+    let appender = Appender::begin(&log, &Destination::InPlace, &[], Compression::None).unwrap();
+    replace(&trial.path);
+    let error = appender.finish().unwrap_err();
+    assert!(matches!(&error, LogError::Write { .. }), "{error}");
+    assert_eq!((trial.now().as_slice(), trial.names()), (&b"another file"[..], vec!["in.mcap".to_owned()]));
+
+    trial.reset(&trial.original);
+    let log = Log::open_in_place(&trial.path).unwrap();
+    replace(&trial.path);
+    let refused = Appender::check(&log, &Destination::InPlace, &[]).unwrap_err();
+    assert!(matches!(&refused, LogError::NotInPlace { .. }), "{refused}");
+}
+
+#[test]
+fn a_file_that_another_run_changes_in_place_is_not_replaced() {
+    let trial = Trial::new();
+    let [input, output] = ["input", "output"].map(|name| trial.path.with_file_name(name));
+    fs::write(&input, &trial.original).unwrap();
+    fs::write(&output, &trial.original).unwrap();
+    let log = Log::open(&input).unwrap();
+    let to = Destination::New { out: output.clone(), force: true };
+    let begin = || Appender::begin(&log, &to, &[], Compression::None).unwrap();
+
+    let appender = begin();
+    let changed = Log::open_in_place(&output).unwrap();
+    assert!(matches!(appender.finish(), Err(LogError::InUse { .. })));
+    drop(changed);
+
+    let appender = begin();
+    during(Some(Cut::From(8)), || add(&output, "/x", &Destination::InPlace)).0.unwrap_err();
+    assert!(matches!(appender.finish(), Err(LogError::Pending { .. })));
+    put_back(&output).unwrap();
+    assert!(fs::read(&output).unwrap() == trial.original);
+    begin().finish().unwrap();
+}

@@ -28,7 +28,7 @@ pub(super) const DATA_END_LEN: u64 = HEAD_LEN + DATA_END_BODY_LEN;
 pub(super) struct Ending {
     /// Where the data section ends: at `DataEnd`, else behind the last whole record.
     pub(super) data_end: u64,
-    /// Whether the data section was cut off: no `DataEnd` is there, and more records might have been.
+    /// Whether no `DataEnd` stands there, be it that the data section was cut off.
     pub(super) is_cut: bool,
     /// What `DataEnd` says.
     pub(super) data_section_crc: Option<u32>,
@@ -65,6 +65,8 @@ pub(super) fn find(file: &LogFile, data_start: u64, damages: &mut Damages) -> Re
         let data_section_crc = Some(crc.data_section_crc).filter(|&crc| crc != 0);
         return Ok(Ending { data_end: head.offset, data_section_crc, distrusted: true, ..Ending::default() });
     }
+    // That a log which is cut off lacks its last bytes is no news.
+    found.found.retain(|damage| damage.offset < file.len - MAGIC_LEN);
     damages.found.append(&mut found.found);
     let cut_chunk = chunk::look_at_cut(file, walked.at)?;
     let left = file.len - walked.at;
@@ -105,36 +107,55 @@ fn read(file: &LogFile, data_start: u64, end: u64, damages: &mut Damages) -> Res
     }
     let at = tail_start - DATA_END_LEN;
     let data_end = data_end_at(file, at, tail_start);
-    if data_end.is_none() && footer.summary_crc == 0 {
+    // The CRC spans the summary and the footer up to the CRC itself.
+    let tail_len = end - MAGIC_LEN - 4 - tail_start;
+    // One that is too large to be checked is no better than one without a checksum.
+    if data_end.is_none() && (footer.summary_crc == 0 || tail_len > file.options.memory_limit) {
         return Err(file.damaged(at, "expected the end of the data section before the summary"));
     }
 
-    // The CRC spans the summary and the footer up to the CRC itself.
-    let tail_len = end - MAGIC_LEN - 4 - tail_start;
     let mut records = file.bytes(tail_start, tail_len, "the summary")?;
     let found = crc32fast::hash(&records);
     if footer.summary_crc != 0 && footer.summary_crc != found {
         let what = format!("the summary's CRC is {found:08x}, the footer says {:08x}", footer.summary_crc);
         return Err(file.damaged(tail_start, what));
     }
-    let data_end = match data_end {
-        Some(head) => Some(head),
-        // A DataEnd may have bytes behind its fields, as any record.
-        None => walk(file, data_start..tail_start)?.data_end.filter(|head| head.end() == tail_start),
+    let walked = match data_end {
+        Some(head) => Walked { at: head.offset, data_end, why: String::new() },
+        None => walk_to_summary(file, data_start, at..tail_start)?,
     };
-    let crc = data_end.map(|head| read_record::<DataEnd>(file, head, "data end")).transpose()?;
+    let crc = walked.data_end.map(|head| read_record::<DataEnd>(file, head, "data end")).transpose()?;
     if crc.is_none() {
-        damages.push(at, "expected the end of the data section before the summary");
+        damages.push(walked.at, "expected the end of the data section before the summary");
     }
     records.truncate((records_end - tail_start) as usize);
     Ok(Ending {
-        data_end: data_end.map_or(at, |head| head.offset),
+        data_end: walked.at,
+        is_cut: crc.is_none(),
         data_section_crc: crc.map(|crc| crc.data_section_crc).filter(|&crc| crc != 0),
         summary_start: Some(footer.summary_start).filter(|&start| start != 0),
         summary_crc: Some(footer.summary_crc).filter(|&crc| crc != 0),
         records,
         ..Ending::default()
     })
+}
+
+/// Where the records end before a summary that can be trusted, though no `DataEnd` stands in its `place`, which
+/// ends with the data section.
+fn walk_to_summary(file: &LogFile, data_start: u64, place: Range<u64>) -> Result<Walked, LogError> {
+    let before = walk(file, data_start..place.start)?;
+    if before.at == place.start {
+        // What stands in its place is it, broken, and no record of the data section.
+        return Ok(before);
+    }
+    // It may have bytes behind its fields, as any record, or not be there at all.
+    let walked = walk(file, before.at..place.end)?;
+    match walked.data_end {
+        Some(head) if head.end() == place.end => Ok(walked),
+        // Garbage ends the walk, but not what the summary names.
+        _ if walked.at < place.start => Ok(Walked { at: place.end, data_end: None, ..walked }),
+        _ => Ok(Walked { data_end: None, ..walked }),
+    }
 }
 
 fn data_end_at(file: &LogFile, at: u64, end: u64) -> Option<Head> {

@@ -1,8 +1,11 @@
 //! What can go wrong between a log and this program.
 
-use std::{io, path::PathBuf};
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
 
-use super::Damage;
+use super::{Damage, disk, nearby};
 use crate::printable::shell_word;
 
 /// Why a log could not be read, or its successor not written.
@@ -200,9 +203,15 @@ impl LogError {
     #[must_use]
     pub fn hint(&self) -> Option<String> {
         let hint = match self {
+            Self::Open { path, .. } => return nearby::hint(path),
+            Self::NotMcap { path, .. } if path.extension().is_some_and(|e| e == "toml") => {
+                "the log comes first; a config goes behind `--config`"
+            }
+            Self::NotMcap { found, .. } if found == EMPTY => "its recording, or its copy, never began",
             Self::NotMcap { .. } => "trackfuse reads MCAP; `mcap convert` makes one of a ROS bag",
+            Self::Write { path, source } => return write_hint(path, source),
             Self::CutOff { .. } | Self::Damaged { .. } | Self::BadChunk { .. } => {
-                "`mcap recover IN -o OUT` saves what is readable (it drops private records and bad chunks)"
+                "`trackfuse inspect --verify` names all that is wrong; repair a copy, and keep this one"
             }
             Self::NotWhole { .. } => "without `--strict`, what can be trusted is used, and the rest is named",
             Self::TopicTaken { .. } => {
@@ -214,9 +223,7 @@ impl LogError {
                 "`-o` names another output; `--in-place` adds to the log itself, where a command has it"
             }
             Self::InUse { .. } => "wait until it has ended",
-            Self::NotInPlace { .. } => {
-                "`-o` writes a new log, `--sidecar` a log of the new channels only; neither touches this one"
-            }
+            Self::NotInPlace { .. } => "`-o` writes a new log, and leaves this one as it is",
             Self::Pending { path } | Self::NotPutBack { path, .. } => {
                 let log = shell_word(&path.display().to_string());
                 return Some(format!(
@@ -225,7 +232,8 @@ impl LogError {
                 ));
             }
             Self::BadUndo { .. } => {
-                "if the log beside it is whole (another copy, say), remove the file; else keep both"
+                "`trackfuse inspect --verify` on a copy of the log, elsewhere, tells whether the log is whole: then remove \
+                 the file; else keep both"
             }
             Self::NothingAdded { moved: true, .. } => {
                 "another program rewrote the log: only a log as trackfuse wrote it leads back to the original"
@@ -235,6 +243,27 @@ impl LogError {
         };
         Some(hint.to_owned())
     }
+}
+
+/// What is found of a file without a byte.
+pub(super) const EMPTY: &str = "the file is empty";
+
+fn write_hint(path: &Path, source: &io::Error) -> Option<String> {
+    let hint = match source.kind() {
+        io::ErrorKind::NotFound => {
+            return Some(format!(
+                "`mkdir -p {}` makes it",
+                shell_word(&disk::folder(path).to_string_lossy())
+            ));
+        }
+        io::ErrorKind::IsADirectory => "`-o` names a file",
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+            "`-o` names an output in a folder that you may write to"
+        }
+        io::ErrorKind::StorageFull => "free some space, or let `-o` name an output on another disk",
+        _ => return None,
+    };
+    Some(hint.to_owned())
 }
 
 fn more_damage(more: usize) -> String {

@@ -8,7 +8,7 @@ use std::{
 
 use binrw::{BinRead, BinReaderExt};
 
-use super::{LogError, ReadOptions, undo};
+use super::{LogError, ReadOptions, output, undo};
 
 /// Opcode and length, before each record's body.
 pub(super) const HEAD_LEN: u64 = 9;
@@ -75,6 +75,8 @@ impl LogFile {
             other => other?,
         };
         match log.file.try_lock() {
+            // Between opening and locking another run may have replaced it.
+            Ok(()) if !log.has_its_name() => Err(LogError::InUse { path: path.to_owned() }),
             Ok(()) => Ok(Self { is_exclusive: true, ..log }),
             Err(TryLockError::WouldBlock) => Err(LogError::InUse { path: path.to_owned() }),
             Err(TryLockError::Error(e)) => Err(refused(io::Error::other(format!("it can't be locked: {e}")))),
@@ -92,6 +94,11 @@ impl LogFile {
         let file = access.open(path).map_err(cannot)?;
         let len = file.metadata().map_err(cannot)?.len();
         Ok(Self { path: path.to_owned(), file, len, options, is_exclusive: false })
+    }
+
+    /// Whether its path still leads to this file.
+    pub(super) fn has_its_name(&self) -> bool {
+        output::is_same_file(&self.file, &self.path, &self.path)
     }
 
     /// The file's bytes from `offset` on. Readers don't disturb each other.

@@ -2,15 +2,15 @@
 
 use std::{collections::BTreeSet, ops::Range};
 
-use mcap::records::{AttachmentHeader, AttachmentIndex, ChunkIndex, MetadataIndex, op};
+use mcap::records::{AttachmentHeader, ChunkIndex, MetadataIndex, op};
 
 use super::damage::Damages;
 use super::ending::may_stand_in_data;
 use super::file::{HEAD_LEN, Head, LogFile};
-use super::index::{SummaryRecord, read_record};
+use super::index::{SummaryRecord, attachment_index, read_record};
 use super::part::MESSAGE_HEADER_LEN;
 use super::summary::encode;
-use super::{Index, LogError, chunk};
+use super::{Index, LogError, Work, chunk};
 
 /// Runs of loose records are cut into pieces of about this size, which are read at once.
 const LOOSE_PIECE: u64 = 4 << 20;
@@ -22,8 +22,6 @@ pub(super) struct Gaps<'a> {
     pub(super) file: &'a LogFile,
     pub(super) index: &'a mut Index,
     pub(super) damages: &'a mut Damages,
-    /// Schemas and channels outside chunks, whole records.
-    pub(super) definitions: Vec<(u8, Vec<u8>)>,
     /// The first message outside chunks.
     pub(super) loose: Option<u64>,
     /// The first bytes that are no record.
@@ -63,6 +61,7 @@ impl Gaps<'_> {
                 self.damages.note(taken)?;
             }
             position = head.end();
+            self.file.options.observer.tell(Work::Scan, position, self.index.data_end);
         }
         self.add_chunk(chunk)
     }
@@ -85,10 +84,14 @@ impl Gaps<'_> {
                 self.add_loose(head);
             }
             op::SCHEMA | op::CHANNEL => {
-                let len = head.end() - head.offset;
-                let bytes = self.file.bytes(head.offset, len, "a schema or channel")?;
-                self.definitions.push((head.opcode, bytes));
                 self.add_loose(head);
+                // A log may repeat them any number of times: known ones aren't read again.
+                let id = self.file.bytes(head.body(), head.body_len.min(2), "a schema or channel")?;
+                if self.index.knows(head.opcode, &id) != Ok(true) {
+                    let len = head.end() - head.offset;
+                    let whole = self.file.bytes(head.offset, len, "a schema or channel")?;
+                    self.index.adopt(self.file, head.offset, head.opcode, whole)?;
+                }
             }
             op::CHUNK => {
                 let (header, _) = chunk::read_header(self.file, head.offset, head.end())?;
@@ -128,8 +131,9 @@ impl Gaps<'_> {
     }
 
     fn add_loose(&mut self, head: Head) {
+        let piece = LOOSE_PIECE.min(self.file.options.memory_limit);
         match self.index.loose.last_mut() {
-            Some(run) if run.end == head.offset && head.end() - run.start <= LOOSE_PIECE => {
+            Some(run) if run.end == head.offset && head.end() - run.start <= piece => {
                 run.end = head.end();
             }
             _ => self.index.loose.push(head.offset..head.end()),
@@ -151,15 +155,7 @@ impl Gaps<'_> {
                 format!("an attachment claims {data_size} bytes, its record has {} in all", head.body_len);
             return Err(self.file.damaged(head.offset, what));
         }
-        let entry = AttachmentIndex {
-            offset: head.offset,
-            length: head.end() - head.offset,
-            log_time: header.log_time,
-            create_time: header.create_time,
-            data_size,
-            name: header.name,
-            media_type: header.media_type,
-        };
+        let entry = attachment_index(head, header, data_size);
         self.add(op::ATTACHMENT_INDEX, encode(op::ATTACHMENT_INDEX, &entry))
     }
 

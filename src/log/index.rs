@@ -3,11 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use mcap::records::{AttachmentIndex, Channel, ChunkIndex, MetadataIndex, SchemaHeader, Statistics, op};
+use mcap::records::{
+    AttachmentHeader, AttachmentIndex, Channel, ChunkIndex, MetadataIndex, SchemaHeader, Statistics, op,
+};
 
 use super::LogError;
 use super::chunk::CutChunk;
-use super::file::{Head, LogFile, parse};
+use super::file::{HEAD_LEN, Head, LogFile, parse};
 use super::rescue::TornChunk;
 
 /// How a channel's messages are made up.
@@ -99,7 +101,7 @@ pub struct Index {
     /// Where the data section ends: at the `DataEnd` record, or behind the last whole record of a log that is
     /// cut off. The bytes before it never change.
     pub data_end: u64,
-    /// Whether the log is cut off before its `DataEnd` record.
+    /// Whether no `DataEnd` record stands at the data section's end: the log is cut off there, or has none.
     pub is_cut: bool,
     /// Where the summary begins, `None` where there is none, or none that can be trusted.
     pub summary_start: Option<u64>,
@@ -113,6 +115,8 @@ pub struct Index {
     pub file_len: u64,
     /// The summary's records as they stand, but for summary offsets; what was missing comes behind them.
     pub(super) summary: Vec<SummaryRecord>,
+    /// How many bytes of schemas and channels the summary left out.
+    pub(super) adopted_bytes: u64,
     /// Runs of schemas, channels and messages outside chunks, in pieces of some MB.
     pub(super) loose: Vec<Range<u64>>,
     /// Of a log that is cut off within a chunk.
@@ -135,6 +139,45 @@ impl Index {
     /// Channels of a topic: several where a log was merged, or its writer restarted.
     pub fn channels_of<'a>(&'a self, topic: &'a str) -> impl Iterator<Item = &'a Channel> {
         self.channels.values().filter(move |channel| channel.topic == topic)
+    }
+
+    /// Whether there is a schema or channel with the id that `body` begins with.
+    pub(super) fn knows(&self, opcode: u8, body: &[u8]) -> Result<bool, String> {
+        let id = parse::<u16>(body)?;
+        Ok(if opcode == op::SCHEMA {
+            self.schemas.contains_key(&id)
+        } else {
+            self.channels.contains_key(&id)
+        })
+    }
+
+    /// Takes in a schema or channel that the summary leaves out, a whole record found at or in what is at `offset`.
+    ///
+    /// # Errors
+    /// [`LogError::Damaged`]; [`LogError::TooLarge`] where it takes more than the limit with those before.
+    pub(super) fn adopt(
+        &mut self,
+        file: &LogFile,
+        offset: u64,
+        opcode: u8,
+        whole: Vec<u8>,
+    ) -> Result<(), LogError> {
+        let body = whole.get(HEAD_LEN as usize..).unwrap_or_default();
+        let damaged = |problem: String| file.damaged(offset, problem);
+        if self.knows(opcode, body).map_err(damaged)? {
+            return Ok(());
+        }
+        self.adopted_bytes += whole.len() as u64;
+        if self.adopted_bytes > file.options.memory_limit {
+            return Err(file.too_large(
+                offset,
+                "a schema or channel, with those before it,",
+                self.adopted_bytes,
+            ));
+        }
+        self.insert(opcode, body).map_err(damaged)?;
+        self.summary.push(SummaryRecord { opcode, bytes: whole });
+        Ok(())
     }
 
     /// Puts one record of the summary into the index.
@@ -164,4 +207,11 @@ where
     T: for<'a> binrw::BinRead<Args<'a> = ()>,
 {
     file.parse(head.offset, what, &file.bytes(head.body(), head.body_len, what)?)
+}
+
+/// What the index says of an attachment.
+pub(super) fn attachment_index(head: Head, header: AttachmentHeader, data_size: u64) -> AttachmentIndex {
+    let AttachmentHeader { log_time, create_time, name, media_type } = header;
+    let length = head.end() - head.offset;
+    AttachmentIndex { offset: head.offset, length, log_time, create_time, data_size, name, media_type }
 }

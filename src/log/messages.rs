@@ -55,14 +55,6 @@ pub struct MessagesRead {
     pub damaged: Vec<LogError>,
 }
 
-impl MessagesRead {
-    /// Where the chunks begin that can't be decoded at all: no index should lead to them.
-    #[must_use]
-    pub fn bad_chunks(&self) -> BTreeSet<u64> {
-        bad_chunks(&self.damaged)
-    }
-}
-
 /// A sentence on each thing that was passed over, the first of many only.
 #[must_use]
 pub fn passed_over(damaged: &[LogError]) -> Vec<String> {
@@ -82,7 +74,7 @@ pub fn passed_over(damaged: &[LogError]) -> Vec<String> {
     sentences
 }
 
-/// Where the chunks begin that some of `errors` say can't be decoded.
+/// Where the chunks begin that some of `errors` say can't be decoded at all: no index should lead to them.
 #[must_use]
 pub fn bad_chunks(errors: &[LogError]) -> BTreeSet<u64> {
     let bad = |error: &LogError| match error {

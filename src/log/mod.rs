@@ -28,8 +28,10 @@
 mod addition;
 mod append;
 mod by_index;
+mod checksum;
 mod chunk;
 mod contents;
+mod copying;
 #[cfg(test)]
 mod crash;
 mod damage;
@@ -48,6 +50,8 @@ mod in_order;
 mod index;
 mod interrupt;
 mod messages;
+mod nearby;
+mod new_chunk;
 mod new_file;
 mod old_tail;
 mod open;
@@ -63,7 +67,7 @@ mod undo;
 pub mod verify;
 mod visibility;
 
-pub use addition::{Compression, NewChannel, NewMessage, NewMetadata};
+pub use addition::{Compression, Encoding, NewChannel, NewMessage, NewMetadata};
 pub use append::{Appender, Written};
 pub use damage::Damage;
 pub use error::LogError;
@@ -72,7 +76,7 @@ pub use index::{Index, LeftOut, Schema};
 pub use interrupt::{INTERRUPTION, Interruption};
 pub use mcap::records::{AttachmentIndex, Channel, ChunkIndex, MetadataIndex, Statistics};
 pub use messages::{Message, MessagesRead, OwnedMessage, bad_chunks, passed_over};
-pub use new_file::write_new;
+pub use new_file::{Prepared, check_name, write_new};
 pub use open::Log;
 pub use options::{Observer, Progress, ReadOptions, Work};
 pub use output::Destination;

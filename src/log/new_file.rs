@@ -32,22 +32,58 @@ pub fn write_new<E: From<LogError>>(
     force: bool,
     write: impl FnOnce(&mut BufWriter<NamedTempFile>) -> Result<(), E>,
 ) -> Result<u64, E> {
-    let written = |source| LogError::Write { path: out.to_owned(), source };
-    check_name(out, force)?;
-    let _writing = Writing::begin();
-    let mut file = BufWriter::new(temporary_beside(out, None)?);
-    write(&mut file)?;
-    let len = file.stream_position().map_err(written)?;
-    interrupt::check(out)?;
-    let file = file.into_inner().map_err(|e| written(e.into_error()))?;
-    publish(file, out, force)?;
+    let prepared = Prepared::new(out, force, write)?;
+    let len = prepared.len;
+    prepared.publish()?;
     Ok(len)
+}
+
+/// A new file, all of it on the disk, that doesn't bear its name yet; dropped, it leaves nothing.
+#[derive(Debug)]
+pub struct Prepared {
+    file: NamedTempFile,
+    out: PathBuf,
+    force: bool,
+    len: u64,
+    _writing: Writing,
+}
+
+impl Prepared {
+    /// Writes the file's content.
+    ///
+    /// # Errors
+    /// As [`write_new`].
+    pub fn new<E: From<LogError>>(
+        out: &Path,
+        force: bool,
+        write: impl FnOnce(&mut BufWriter<NamedTempFile>) -> Result<(), E>,
+    ) -> Result<Self, E> {
+        let written = |source| LogError::Write { path: out.to_owned(), source };
+        check_name(out, force)?;
+        let writing = Writing::begin();
+        let mut file = BufWriter::new(temporary_beside(out, None)?);
+        write(&mut file)?;
+        let len = file.stream_position().map_err(written)?;
+        interrupt::check(out)?;
+        let file = file.into_inner().map_err(|e| written(e.into_error()))?;
+        disk::sync(file.as_file()).map_err(written)?;
+        Ok(Self { file, out: out.to_owned(), force, len, _writing: writing })
+    }
+
+    /// Gives it its name.
+    ///
+    /// # Errors
+    /// As [`write_new`].
+    pub fn publish(self) -> Result<(), LogError> {
+        publish(self.file, &self.out, self.force)
+    }
 }
 
 /// Syncs and names a file, and syncs its directory.
 pub(super) fn publish(file: NamedTempFile, out: &Path, force: bool) -> Result<(), LogError> {
     let written = |source| LogError::Write { path: out.to_owned(), source };
     disk::sync(file.as_file()).map_err(written)?;
+    let _held = if force { hold(out)? } else { None };
     disk::take(Step::Rename).map_err(written)?;
     let named = if force { file.persist(out) } else { file.persist_noclobber(out) };
     match named {
@@ -60,6 +96,18 @@ pub(super) fn publish(file: NamedTempFile, out: &Path, force: bool) -> Result<()
     // the file is there and whole: that its name is on the disk too is wished for, and not always granted
     let _ = disk::sync_folder(out);
     Ok(())
+}
+
+/// The file that is about to be replaced, held so that no run begins to change it in place meanwhile: its work
+/// would be lost with it.
+fn hold(out: &Path) -> Result<Option<File>, LogError> {
+    let is_file = fs::symlink_metadata(out).is_ok_and(|found| found.is_file());
+    let Some(file) = is_file.then(|| File::open(out).ok()).flatten() else { return Ok(None) };
+    if let Err(TryLockError::WouldBlock) = file.try_lock_shared() {
+        return Err(LogError::InUse { path: out.to_owned() });
+    }
+    undo::refuse_pending(out)?;
+    Ok(Some(file))
 }
 
 /// The input's permissions, writable by its owner: a private recording's successor is private too.
@@ -181,17 +229,22 @@ pub(super) fn is_at(_: &File, _: &Path) -> bool {
 }
 
 /// Refuses a name before any work is done for it.
-pub(super) fn check_name(out: &Path, force: bool) -> Result<(), LogError> {
+///
+/// # Errors
+/// [`LogError::OutputExists`] without `force`; [`LogError::Write`] where no file can be.
+pub fn check_name(out: &Path, force: bool) -> Result<(), LogError> {
     let path = || out.to_owned();
-    let cannot = |why: String| Err(LogError::Write { path: path(), source: io::Error::other(why) });
+    let cannot = |kind, why: String| Err(LogError::Write { path: path(), source: io::Error::new(kind, why) });
     let folder = disk::folder(out);
     if !folder.is_dir() {
-        return cannot(format!("there is no folder {}", folder.display()));
+        return cannot(io::ErrorKind::NotFound, format!("there is no folder {}", folder.display()));
     }
     match fs::symlink_metadata(out) {
-        Ok(found) if found.is_dir() => cannot("it is a directory".into()),
+        Ok(found) if found.is_dir() => cannot(io::ErrorKind::IsADirectory, "it is a directory".into()),
         // A device or a pipe would be replaced, not written to. A link is: what it leads to stays.
-        Ok(found) if !found.is_file() && !found.is_symlink() => cannot("it is no regular file".into()),
+        Ok(found) if !found.is_file() && !found.is_symlink() => {
+            cannot(io::ErrorKind::Other, "it is no regular file".into())
+        }
         Ok(_) if !force => Err(LogError::OutputExists { path: path() }),
         // What lies beside it is of this file.
         Ok(_) => undo::refuse_pending(out),

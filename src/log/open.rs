@@ -1,6 +1,10 @@
 //! A log, open for reading: whatever of it can be trusted, and what is wrong with the rest.
 
-use std::{collections::BTreeMap, io::Read, path::Path};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    io::Read,
+    path::Path,
+};
 
 use mcap::records::{Header, MetadataIndex, op};
 
@@ -97,8 +101,10 @@ impl Log {
             (visibility, _) = survey::complete(&file, &mut index, &mut damages)?;
         }
         let mut damage = damages.found;
-        damage.sort();
-        damage.dedup();
+        // Of one place the cause stands first, as it was found first.
+        damage.sort_by_key(|damage| damage.offset);
+        let mut said = BTreeSet::new();
+        damage.retain(|damage| said.insert(damage.clone()));
         Ok(Self { file, index, visibility, damage })
     }
 
@@ -240,7 +246,7 @@ fn check_magic(file: &LogFile) -> Result<Head, LogError> {
     let start = file.bytes(0, file.len.min(MAGIC_LEN), "the magic at the start")?;
     let not_mcap = |found: String| Err(LogError::NotMcap { path: file.path.clone(), found });
     if start.is_empty() {
-        return not_mcap("the file is empty".to_owned());
+        return not_mcap(super::error::EMPTY.to_owned());
     }
     if start != MAGIC {
         if MAGIC.starts_with(&start) {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 /// What one record or one chunk may take in memory, where nobody says otherwise. Recorders write chunks of 1 to
 /// 8 MB; the largest single messages (point clouds, images) have some hundred MB.
-pub(super) const MEMORY_LIMIT: u64 = 1 << 30;
+const MEMORY_LIMIT: u64 = 1 << 30;
 
 /// How a log is read.
 #[derive(Clone, Debug)]

@@ -2,22 +2,19 @@
 
 use std::{
     fs::{self, File},
-    io::{self, BufWriter, Read, Seek, Write},
+    io::{self, BufWriter, Read, Write},
     path::{Path, PathBuf},
 };
 
 use tempfile::NamedTempFile;
 
+use super::copying::Copying;
 use super::disk;
 use super::file::{At, LogFile};
 use super::interrupt::{self, Writing};
 use super::new_file::{check_name, publish, readable_by_the_same, temporary_beside};
 use super::undo::Undo;
-use super::{Log, LogError, Work};
-
-/// So much is copied before somebody who wants it to end is heard. A multiple of any file system's block, so
-/// that blocks can be shared.
-const COPY_PIECE: u64 = 64 << 20;
+use super::{Log, LogError};
 
 /// Where new channels go.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -86,9 +83,9 @@ impl<'a> Sink<'a> {
         let mut crc = index.data_section_crc.map(crc32fast::Hasher::new_with_initial);
         let kind = match destination {
             Destination::New { force, .. } => {
-                let mut file = temporary_beside(path, readable_by_the_same(&log.file.file))?;
-                copy_start(&log.file, position, file.as_file_mut(), path)?;
-                Kind::New { file: Some(file), force: *force, log: &log.file, data_end: position }
+                let file = temporary_beside(path, readable_by_the_same(&log.file.file))?;
+                let copying = Some(Copying::begin(&log.file, position, file.as_file(), path)?);
+                Kind::New { copying, file: Some(file), force: *force, log: &log.file, data_end: position }
             }
             Destination::InPlace => {
                 let tail = log.file.reader(position);
@@ -98,7 +95,8 @@ impl<'a> Sink<'a> {
             Destination::Sidecar { force, .. } => {
                 let file = temporary_beside(path, readable_by_the_same(&log.file.file))?;
                 (position, crc) = (0, Some(crc32fast::Hasher::new()));
-                Kind::New { file: Some(file), force: *force, log: &log.file, data_end: index.data_end }
+                let data_end = index.data_end;
+                Kind::New { copying: None, file: Some(file), force: *force, log: &log.file, data_end }
             }
         };
         let file = BufWriter::new(Target { kind, position });
@@ -134,12 +132,14 @@ impl<'a> Sink<'a> {
     pub(super) fn finish(mut self) -> Result<(), LogError> {
         self.file.flush().map_err(|e| self.failed(e))?;
         match &mut self.file.get_mut().kind {
-            Kind::New { file, force, .. } => match file.take() {
-                Some(file) => publish(file, &self.path, *force),
-                None => Ok(()),
-            },
+            Kind::New { copying, file, force, .. } => {
+                copying.take().map_or(Ok(()), |mut copying| copying.finish())?;
+                file.take().map_or(Ok(()), |file| publish(file, &self.path, *force))
+            }
             Kind::InPlace { log, undo, is_original } => {
-                let done = disk::sync(&log.file).and_then(|()| undo.remove());
+                let lost = || io::Error::other("another file took its name meanwhile");
+                let named = || log.has_its_name().then_some(()).ok_or_else(lost);
+                let done = disk::sync(&log.file).and_then(|()| named()).and_then(|()| undo.remove());
                 // then there is nothing left to put back
                 *is_original = done.is_ok();
                 done.map_err(|e| self.failed(e))
@@ -170,7 +170,13 @@ struct Target<'a> {
 #[derive(Debug)]
 enum Kind<'a> {
     /// `file` has no name yet; without one it is finished or taken back.
-    New { file: Option<NamedTempFile>, force: bool, log: &'a LogFile, data_end: u64 },
+    New {
+        copying: Option<Copying>,
+        file: Option<NamedTempFile>,
+        force: bool,
+        log: &'a LogFile,
+        data_end: u64,
+    },
     /// While `is_original` isn't set, the log is being changed.
     InPlace { log: &'a LogFile, undo: Undo, is_original: bool },
 }
@@ -178,7 +184,10 @@ enum Kind<'a> {
 impl Target<'_> {
     fn take_back(&mut self) -> io::Result<()> {
         match &mut self.kind {
-            Kind::New { file, .. } => *file = None,
+            Kind::New { copying, file, .. } => {
+                *copying = None;
+                *file = None;
+            }
             Kind::InPlace { is_original: true, .. } => {}
             Kind::InPlace { log, undo, is_original } => {
                 // Whatever comes of it, nothing more is written.
@@ -214,26 +223,6 @@ impl Drop for Target<'_> {
     }
 }
 
-/// The first `len` bytes of a log, at the start of `file`, which will be `out`. Both are plain files, so that
-/// the kernel copies, and shares blocks where it can.
-pub(super) fn copy_start(log: &LogFile, len: u64, file: &mut File, out: &Path) -> Result<(), LogError> {
-    let written = |source| LogError::Write { path: out.to_owned(), source };
-    let mut source = &log.file;
-    source.rewind().map_err(written)?;
-    let mut copied = 0;
-    while copied < len {
-        interrupt::check(out)?;
-        let piece = io::copy(&mut source.take(COPY_PIECE.min(len - copied)), file).map_err(written)?;
-        if piece == 0 {
-            let what = format!("only {copied} bytes of the data section are left, expected {len}");
-            return Err(log.damaged(copied, what));
-        }
-        copied += piece;
-        log.options.observer.tell(Work::Copy, copied, len);
-    }
-    Ok(())
-}
-
 /// Appends `len` bytes to `file`, which is `position` long and will be `out`.
 pub(super) fn copy_behind(
     from: At<'_>,
@@ -262,6 +251,9 @@ pub(super) fn ensure_in_place(log: &Log) -> Result<(), LogError> {
     }
     if let Some(damage) = log.damage().first() {
         return refuse(&format!("it is damaged at offset {}: {}", damage.offset, damage.what));
+    }
+    if !log.file.has_its_name() {
+        return refuse("another file took its name meanwhile");
     }
     if !log.has_its_length() {
         return refuse("somebody else changed it meanwhile");

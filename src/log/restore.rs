@@ -1,14 +1,17 @@
 //! The original of a log that was added to, bit for bit.
 
-use std::io::Read;
+use std::io::{self, Read};
 use std::path::Path;
 
-use mcap::records::op;
+use mcap::records::{DataEnd, op};
 
+use super::checksum::crc_of_start;
+use super::copying::copy_start;
 use super::file::{At, LogFile};
+use super::index::read_record;
 use super::interrupt::Writing;
 use super::new_file::{check_name, publish, readable_by_the_same, temporary_beside};
-use super::output::{check_output, copy_behind, copy_start, ensure_in_place, is_same_file};
+use super::output::{check_output, copy_behind, ensure_in_place, is_same_file};
 use super::undo::{self, Undo, for_each_piece};
 use super::{Log, LogError, ReadOptions, old_tail};
 
@@ -22,6 +25,9 @@ pub struct Addition {
     pub offset: u64,
     /// Length of the original in bytes.
     pub original_len: u64,
+    /// Where the first record begins that another program appended since: taking the addition off takes it away
+    /// too.
+    pub appended_by_others: Option<u64>,
     /// Where the attachment with the original's end begins.
     attached_at: u64,
     /// Where the original's end stands in the log.
@@ -52,18 +58,20 @@ impl Log {
                 moved = true;
                 continue;
             }
-            let tail_len = found.data_size;
+            // What the index claims may be more than there is.
+            let tail_len = found.data_size.min(found.length);
             let head = old_tail::head(data_end, tail_len);
             let stands = self.file.bytes(found.offset, head.len() as u64, "an attachment")?;
             if stands != head {
                 return Err(self.file.damaged(found.offset, "the attachment with the original's end"));
             }
             if let Some(before) = additions.last_mut() {
-                before.end = found.offset;
+                before.end = data_end;
             }
             additions.push(Addition {
                 offset: data_end,
                 original_len: data_end.saturating_add(tail_len),
+                appended_by_others: None,
                 attached_at: found.offset,
                 tail_at: found.offset + head.len() as u64,
                 end: index.data_end,
@@ -72,7 +80,26 @@ impl Log {
         if additions.is_empty() {
             return Err(LogError::NothingAdded { path: self.path().to_owned(), moved });
         }
+        let mut later = None;
+        for addition in additions.iter_mut().rev() {
+            later = self.others_within(addition).or(later);
+            addition.appended_by_others = later;
+        }
         Ok(additions)
+    }
+
+    /// Where records of another program begin between an addition and the next: attachments and metadata that
+    /// bear their own names, and whatever stands behind the metadata that an addition ends with.
+    fn others_within(&self, addition: &Addition) -> Option<u64> {
+        let within = addition.attached_at..addition.end;
+        let index = self.index();
+        let attachments = index.attachments.iter().map(|a| (a.offset, &a.name));
+        let named = attachments.chain(index.metadata.iter().map(|m| (m.offset, &m.name)));
+        let others = named.filter(|(at, name)| within.contains(at) && !name.starts_with(METADATA));
+        let ours =
+            index.metadata.iter().rfind(|m| within.contains(&m.offset) && m.name.starts_with(METADATA));
+        let end = ours.map(|m| m.offset.saturating_add(m.length)).filter(|&end| end < addition.end);
+        others.map(|(at, _)| at).chain(end).min()
     }
 
     /// Whether nothing but message indexes stands in the file from `start` to `end`.
@@ -123,24 +150,46 @@ impl Log {
         Ok(())
     }
 
-    /// Writes the original before an addition to a new file.
+    /// Whether the original's data section is as its `DataEnd` says; `None` where that says nothing.
+    fn check_data_section(&self, addition: &Addition) -> Result<Option<bool>, LogError> {
+        let end = self.file.head(addition.tail_at, addition.tail_at + addition.tail_len());
+        let Some(end) = end.ok().filter(|head| head.opcode == op::DATA_END && head.body_len >= 4) else {
+            return Ok(None);
+        };
+        match read_record(&self.file, end, "data end")? {
+            DataEnd { data_section_crc: 0 } => Ok(None),
+            DataEnd { data_section_crc } => {
+                Ok(Some(crc_of_start(&self.file, addition.offset)? == data_section_crc))
+            }
+        }
+    }
+
+    /// Writes the original before an addition to a new file. The answer is whether its data section is as its
+    /// checksum says, `None` where it has none; the log is read once for that.
     ///
     /// # Errors
     /// [`LogError::Damaged`] when it can't be the original; errors of [`super::write_new`].
-    pub fn restore_to(&self, addition: &Addition, out: &Path, force: bool) -> Result<(), LogError> {
+    pub fn restore_to(&self, addition: &Addition, out: &Path, force: bool) -> Result<Option<bool>, LogError> {
         check_output(self, out, force)?;
         self.verify(addition)?;
+        let is_right = self.check_data_section(addition)?;
         let tail = self.file.reader(addition.tail_at);
-        write_original(&self.file, addition.offset, tail, addition.tail_len(), (out, force))
+        write_original(&self.file, addition.offset, tail, addition.tail_len(), (out, force))?;
+        Ok(is_right)
     }
 
     /// Makes the log, opened with [`Log::open_in_place`], the original before an addition.
     ///
     /// # Errors
-    /// [`LogError::Damaged`] when that can't be the original; [`LogError::NotInPlace`]; [`LogError::Write`], and
-    /// then the log is as it was; [`LogError::NotPutBack`].
+    /// [`LogError::Damaged`] when that can't be the original; [`LogError::NotInPlace`], also where another program
+    /// appended something since, which would be lost; [`LogError::Write`], and then the log is as it was;
+    /// [`LogError::NotPutBack`].
     pub fn restore_in_place(self, addition: &Addition) -> Result<(), LogError> {
         ensure_in_place(&self)?;
+        if let Some(at) = addition.appended_by_others {
+            let why = format!("another program appended to it, from offset {at} on, which would be lost");
+            return Err(LogError::NotInPlace { path: self.path().to_owned(), source: io::Error::other(why) });
+        }
         self.verify(addition)?;
         let _writing = Writing::begin();
         // What was added goes by the same way as what a run that is cut off leaves behind.
@@ -177,8 +226,8 @@ fn write_original(
     (out, force): (&Path, bool),
 ) -> Result<(), LogError> {
     let _writing = Writing::begin();
-    let mut file = temporary_beside(out, readable_by_the_same(&log.file))?;
-    copy_start(log, data_end, file.as_file_mut(), out)?;
+    let file = temporary_beside(out, readable_by_the_same(&log.file))?;
+    copy_start(log, data_end, file.as_file(), out)?;
     copy_behind(tail, tail_len, file.as_file(), data_end, out)?;
     publish(file, out, force)
 }

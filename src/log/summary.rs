@@ -11,10 +11,10 @@ use super::index::SummaryRecord;
 
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
-/// What a log of nobody's profile begins with.
-pub(super) fn start() -> Vec<u8> {
-    let header =
-        Header { profile: String::new(), library: format!("trackfuse {}", env!("CARGO_PKG_VERSION")) };
+/// What a log of this profile begins with.
+pub(super) fn start(profile: &str) -> Vec<u8> {
+    let library = format!("trackfuse {}", env!("CARGO_PKG_VERSION"));
+    let header = Header { profile: profile.to_owned(), library };
     [MAGIC, &encode(op::HEADER, &header)].concat()
 }
 
@@ -24,7 +24,9 @@ pub(super) fn encode_bytes(opcode: u8, body: &[&[u8]]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(len + HEAD_LEN as usize);
     bytes.push(opcode);
     bytes.extend((len as u64).to_le_bytes());
-    bytes.extend(body.iter().copied().flatten());
+    for part in body {
+        bytes.extend_from_slice(part);
+    }
     bytes
 }
 

@@ -6,19 +6,19 @@
 
 use std::collections::BTreeSet;
 
-use mcap::records::{Channel, ChunkIndex, Statistics, op};
+use mcap::records::{ChunkIndex, Statistics, op};
 
 use super::chunk::{self, Block, Scratch};
 use super::contents::{self, Closed, Contents, look_into};
 use super::damage::Damages;
 use super::extents;
-use super::file::{HEAD_LEN, LogFile, parse};
+use super::file::LogFile;
 use super::gaps::Gaps;
-use super::index::{LeftOut, Schema, SummaryRecord};
+use super::index::{LeftOut, SummaryRecord};
 use super::rescue::TornChunk;
 use super::summary::encode;
 use super::visibility::Visibility;
-use super::{Index, LogError};
+use super::{Index, LogError, Work};
 
 /// Checks `index` against the file and adds what is missing. The answer is how readers of a successor will find
 /// the messages, and where the data section first holds bytes that are no record.
@@ -35,26 +35,14 @@ pub(super) fn complete(
     let read_by_index = !index.chunks.is_empty() && !index.channels.is_empty();
 
     let data_end = index.data_end;
-    let mut gaps = Gaps {
-        file,
-        index,
-        damages,
-        definitions: Vec::new(),
-        loose: None,
-        garbage: None,
-        chunks: BTreeSet::new(),
-    };
+    let mut gaps = Gaps { file, index, damages, loose: None, garbage: None, chunks: BTreeSet::new() };
     let mut position = gaps.index.data_start;
     for extent in known {
         gaps.walk(position..extent.start)?;
         position = extent.end;
     }
     gaps.walk(position..data_end)?;
-    let Gaps { definitions, loose, garbage, chunks: unnamed, .. } = gaps;
-    for (opcode, bytes) in definitions {
-        let adopted = adopt(index, opcode, &bytes);
-        adopted.unwrap_or_else(|problem| damages.push(index.data_start, problem));
-    }
+    let Gaps { loose, garbage, chunks: unnamed, .. } = gaps;
     index.chunks.sort_by_key(|chunk| chunk.chunk_start_offset);
     index.attachments.sort_by_key(|attachment| attachment.offset);
     index.metadata.sort_by_key(|metadata| metadata.offset);
@@ -66,6 +54,7 @@ pub(super) fn complete(
         damages,
         unnamed,
         hidden: loose,
+        undecodable: BTreeSet::new(),
         closed: false,
         scratch: Scratch::default(),
         buf: Vec::new(),
@@ -109,30 +98,18 @@ fn counts(index: &Index) -> LeftOut {
 /// all that it holds.
 fn tear(index: &mut Index) {
     let data_end = index.data_end;
-    let Some(chunk) = index.chunks.last_mut().filter(|_| index.is_cut && index.cut_chunk.is_none()) else {
-        return;
-    };
+    // A summary that can be trusted names them all.
+    let may_be_torn = index.is_cut && index.cut_chunk.is_none() && index.summary_start.is_none();
+    let Some(chunk) = index.chunks.last_mut().filter(|_| may_be_torn) else { return };
     if chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length == data_end {
         let torn = TornChunk { whole: chunk.clone() };
         chunk.message_index_offsets.clear();
         chunk.message_index_length = 0;
+        let start = torn.whole.chunk_start_offset;
+        // It is indexed anew, with all its message indexes.
+        index.summary.retain(|record| record.chunk_start_offset() != Some(start));
         index.torn_chunk = Some(torn);
     }
-}
-
-/// Puts a schema or channel of the data section into the summary, if that has none with its id.
-fn adopt(index: &mut Index, opcode: u8, whole: &[u8]) -> Result<(), String> {
-    let body = whole.get(HEAD_LEN as usize..).unwrap_or_default();
-    let known = match opcode {
-        op::SCHEMA => index.schemas.contains_key(&Schema::parse(body)?.id),
-        op::CHANNEL => index.channels.contains_key(&parse::<Channel>(body)?.id),
-        _ => true,
-    };
-    if !known {
-        index.insert(opcode, body)?;
-        index.summary.push(SummaryRecord { opcode, bytes: whole.to_vec() });
-    }
-    Ok(())
 }
 
 /// Whether the summary names every schema and channel that anything in it refers to.
@@ -156,6 +133,8 @@ struct Survey<'a> {
     unnamed: BTreeSet<u64>,
     /// The first part with messages that no index names.
     hidden: Option<u64>,
+    /// Chunks that can't be decoded.
+    undecodable: BTreeSet<u64>,
     /// Whether a chunk couldn't be looked into that may be whole.
     closed: bool,
     scratch: Scratch,
@@ -192,26 +171,43 @@ impl Survey<'_> {
                 self.look(&Block::Chunk(&chunk))?;
             }
         }
+        self.drop_undecodable();
         Ok(())
     }
 
     /// Reads every chunk for the schemas and channels that the summary leaves out, and counts.
     fn scan(&mut self) -> Result<(), LogError> {
-        let of_index = Index { summary: Vec::new(), ..self.index.clone() };
+        let Index { chunks, loose, cut_chunk, .. } = &*self.index;
+        let (chunks, loose, cut_chunk) = (chunks.clone(), loose.clone(), cut_chunk.clone());
+        let of_index = Index { chunks, loose, cut_chunk, ..Index::default() };
         let mut counted = Statistics::default();
         for block in chunk::blocks(&of_index) {
-            let Some(Contents { definitions, counted: of_block }) = self.look(&block)? else { continue };
+            let looked = self.look(&block)?;
+            let done = block.offset().saturating_add(block.stored_size());
+            self.file.options.observer.tell(Work::Scan, done, self.index.data_end.max(done));
+            let Some(Contents { definitions, counted: of_block }) = looked else { continue };
             contents::add(&mut counted, &of_block);
+            // Those outside chunks were taken in when the gaps were walked.
+            let definitions = definitions.into_iter().filter(|_| !matches!(block, Block::Loose(_)));
             for (opcode, bytes) in definitions {
-                let adopted = adopt(self.index, opcode, &bytes);
-                adopted.unwrap_or_else(|problem| self.damages.push(block.offset(), problem));
+                let adopted = self.index.adopt(self.file, block.offset(), opcode, bytes);
+                self.damages.note(adopted)?;
             }
         }
+        self.drop_undecodable();
         self.count(counted);
         Ok(())
     }
 
-    /// Looks into one part, and takes it out of the index where it can't be decoded.
+    /// Takes the chunks that can't be decoded out of the index: all at once, there may be many.
+    fn drop_undecodable(&mut self) {
+        let undecodable = std::mem::take(&mut self.undecodable);
+        self.drop_chunks(&undecodable);
+        self.index.chunks.retain(|chunk| !undecodable.contains(&chunk.chunk_start_offset));
+        self.index.undecodable += undecodable.len();
+    }
+
+    /// Looks into one part.
     fn look(&mut self, block: &Block<'_>) -> Result<Option<Contents>, LogError> {
         let looked = look_into(self.file, block, &mut self.scratch, &mut self.buf)?;
         let offset = block.offset();
@@ -228,15 +224,17 @@ impl Survey<'_> {
             (Ok(contents), _) => Ok(Some(contents)),
             (Err(Closed::Undecodable(why)), Block::Chunk(chunk)) => {
                 self.damages.push(offset, why);
-                self.index.undecodable += 1;
+                self.undecodable.insert(offset);
                 self.index.reserved_ids.extend(chunk.message_index_offsets.keys());
-                self.drop_chunks(&[offset].into());
-                self.index.chunks.retain(|chunk| chunk.chunk_start_offset != offset);
                 Ok(None)
             }
             (Err(Closed::Unread(why)), Block::Chunk(chunk)) => {
                 self.damages.push(offset, why);
                 self.closed = true;
+                // What isn't read is given no message indexes.
+                if self.torn() == Some(offset) {
+                    self.index.torn_chunk = None;
+                }
                 if chunk.message_index_offsets.is_empty() {
                     self.hidden.get_or_insert(offset);
                 }

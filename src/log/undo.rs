@@ -27,6 +27,7 @@ use super::{LogError, ReadOptions};
 
 const LINE: &[u8] =
     b"trackfuse undo 1: the end of the log beside this, as it was. `trackfuse restore LOG` puts it back.\n";
+const OTHER_KIND: &str = "it is of another kind or version";
 const SUFFIX: &str = ".trackfuse-undo";
 /// Line, original length, data end, CRC of the log's ends.
 const HEAD_LEN: u64 = LINE.len() as u64 + 8 + 8 + 4;
@@ -102,7 +103,7 @@ impl Undo {
         let len = file.metadata().map_err(cannot)?.len();
         let mut head = vec![0; HEAD_LEN.min(len) as usize];
         At::new(&file, 0).read_exact(&mut head).map_err(cannot)?;
-        let numbers = head.strip_prefix(LINE).ok_or_else(|| bad("it is of another kind or version"))?;
+        let numbers = head.strip_prefix(LINE).ok_or_else(|| bad(OTHER_KIND))?;
         let number =
             |at: usize| numbers.get(at..at + 8).and_then(|b| b.try_into().ok()).map(u64::from_le_bytes);
         let (Some(original_len), Some(data_end), Some(ends)) = (number(0), number(8), numbers.get(16..20))
@@ -209,9 +210,17 @@ pub(super) fn pending(path: &Path) -> Option<PathBuf> {
 /// An error for a log that a run was cut off in.
 pub(super) fn refuse_pending(path: &Path) -> Result<(), LogError> {
     match pending(path) {
-        Some(_) => Err(LogError::Pending { path: path.to_owned() }),
+        Some(undo) if is_ours(&undo) => Err(LogError::Pending { path: path.to_owned() }),
+        Some(path) => Err(LogError::BadUndo { path, what: OTHER_KIND.to_owned() }),
         None => Ok(()),
     }
+}
+
+/// Whether a file begins as what is saved of a log; one that can't be read may.
+fn is_ours(undo: &Path) -> bool {
+    let mut start = Vec::new();
+    let read = File::open(undo).and_then(|file| file.take(LINE.len() as u64).read_to_end(&mut start));
+    read.is_err() || start == LINE
 }
 
 /// Beside the file itself, whatever links lead to it.

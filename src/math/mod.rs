@@ -1,5 +1,6 @@
 //! Mathematics that knows no sea: numbers in, numbers out.
 
+pub mod autocorrelation;
 pub mod banded;
 pub mod chebyshev;
 mod elimination;

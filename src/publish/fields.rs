@@ -1,26 +1,32 @@
-//! What messages are made of: instants, vectors and poses as JSON, with no more digits than anyone needs.
+//! What messages are made of: instants, vectors and poses, with no more digits than anyone needs.
 
 use serde::Serialize;
 
 use crate::time::Time;
 
-#[derive(Clone, Copy, Serialize)]
-pub(super) struct Stamp {
-    sec: i64,
-    nsec: u32,
+/// `google.protobuf.Timestamp` where it is not JSON.
+#[derive(Clone, Copy, PartialEq, prost::Message, Serialize)]
+pub(crate) struct Stamp {
+    #[prost(int64, tag = "1")]
+    pub(super) sec: i64,
+    #[prost(int32, tag = "2")]
+    pub(super) nsec: i32,
 }
 
-impl From<Time> for Stamp {
-    fn from(time: Time) -> Self {
+impl Stamp {
+    pub(crate) fn of(time: Time) -> Self {
         let (sec, nsec) = time.to_stamp();
-        Self { sec, nsec }
+        Self { sec, nsec: nsec.cast_signed() }
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub(super) struct Xyz {
+#[derive(Clone, Copy, PartialEq, prost::Message, Serialize)]
+pub(crate) struct Xyz {
+    #[prost(double, tag = "1")]
     pub(super) x: f64,
+    #[prost(double, tag = "2")]
     pub(super) y: f64,
+    #[prost(double, tag = "3")]
     pub(super) z: f64,
 }
 
@@ -30,24 +36,37 @@ impl From<[f64; 3]> for Xyz {
     }
 }
 
-#[derive(Serialize)]
+impl From<Xyz> for [f64; 3] {
+    fn from(v: Xyz) -> Self {
+        [v.x, v.y, v.z]
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, prost::Message, Serialize)]
 struct Quaternion {
+    #[prost(double, tag = "1")]
     x: f64,
+    #[prost(double, tag = "2")]
     y: f64,
+    #[prost(double, tag = "3")]
     z: f64,
+    #[prost(double, tag = "4")]
     w: f64,
 }
 
 /// A position without an attitude: none is claimed.
-#[derive(Serialize)]
+#[derive(Clone, Copy, PartialEq, prost::Message, Serialize)]
 pub(super) struct Pose {
-    position: Xyz,
-    orientation: Quaternion,
+    #[prost(message, optional, tag = "1")]
+    pub(super) position: Option<Xyz>,
+    #[prost(message, optional, tag = "2")]
+    orientation: Option<Quaternion>,
 }
 
 impl Pose {
     pub(super) fn at(position: Xyz) -> Self {
-        Self { position, orientation: Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 } }
+        let level = Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 };
+        Self { position: Some(position), orientation: Some(level) }
     }
 }
 
@@ -75,12 +94,6 @@ pub(super) fn rounded(v: [f64; 3], parts: f64) -> Option<Xyz> {
 /// Seconds to nanoseconds; `None` where not finite.
 pub(super) fn nano(v: f64) -> Option<f64> {
     v.is_finite().then(|| (v * 1e9).round() / 1e9)
-}
-
-/// The message as JSON.
-pub(super) fn json(message: &impl Serialize) -> Vec<u8> {
-    // a struct of numbers and text always is JSON
-    serde_json::to_vec(message).unwrap_or_default()
 }
 
 /// The frame that viewers draw in when the log names none: they draw nothing without a name. No sensor's

@@ -2,46 +2,65 @@
 
 use serde::Serialize;
 
-use super::fields::{Stamp, Xyz, json, micro, xyz};
-use super::{Context, Published, Topic};
+use super::fields::{Stamp, Xyz, micro, xyz};
+use super::payload::Payload;
+use super::{Context, Published, Topic, ros};
 use crate::quality::BAND_SIGMAS;
 use crate::track::{Track, TrackPoint};
 
-#[derive(Serialize)]
-struct PointMessage<'a> {
-    timestamp: Stamp,
-    frame_id: &'a str,
-    position: Xyz,
-    velocity: Xyz,
+#[derive(Serialize, prost::Message)]
+pub(super) struct PointMessage {
+    #[prost(message, optional, tag = "1")]
+    pub(super) timestamp: Option<Stamp>,
+    #[prost(string, tag = "2")]
+    pub(super) frame_id: String,
+    #[prost(message, optional, tag = "3")]
+    pub(super) position: Option<Xyz>,
+    #[prost(message, optional, tag = "4")]
+    pub(super) velocity: Option<Xyz>,
+    #[prost(message, optional, tag = "5")]
     #[serde(skip_serializing_if = "Option::is_none")]
     acceleration: Option<Xyz>,
+    #[prost(message, optional, tag = "6")]
     #[serde(skip_serializing_if = "Option::is_none")]
-    position_sigma: Option<Xyz>,
+    pub(super) position_sigma: Option<Xyz>,
+    #[prost(message, optional, tag = "7")]
     #[serde(skip_serializing_if = "Option::is_none")]
-    velocity_sigma: Option<Xyz>,
+    pub(super) velocity_sigma: Option<Xyz>,
+    #[prost(message, optional, tag = "8")]
     #[serde(skip_serializing_if = "Option::is_none")]
     position_lower: Option<Xyz>,
+    #[prost(message, optional, tag = "9")]
     #[serde(skip_serializing_if = "Option::is_none")]
     position_upper: Option<Xyz>,
+    #[prost(double, tag = "10")]
     speed: f64,
+    #[prost(double, optional, tag = "11")]
     #[serde(skip_serializing_if = "Option::is_none")]
     depth: Option<f64>,
-    phase: &'a str,
-    method: &'a str,
-    sources: Vec<&'a str>,
+    #[prost(string, tag = "12")]
+    phase: String,
+    #[prost(string, tag = "13")]
+    method: String,
+    #[prost(string, repeated, tag = "14")]
+    sources: Vec<String>,
+}
+
+impl Payload for PointMessage {
+    type Ros = ros::Odometry;
 }
 
 /// The message of a point; `None` where its position or velocity is not finite.
-fn point_message(point: &TrackPoint, frame_id: &str, context: &Context<'_>) -> Option<Vec<u8>> {
+fn point_message(point: &TrackPoint, frame_id: &str, context: &Context<'_>) -> Option<PointMessage> {
     let s = &point.state;
     let edge =
         |sign: f64| xyz(std::array::from_fn(|i| s.position[i] + sign * BAND_SIGMAS * s.position_sigma[i]));
     let sources = context.sources.iter().enumerate().filter(|(i, _)| point.seen_by >> i & 1 == 1);
-    Some(json(&PointMessage {
-        timestamp: point.time.into(),
-        frame_id,
-        position: xyz(s.position)?,
-        velocity: xyz(s.velocity)?,
+    Some(PointMessage {
+        timestamp: Some(Stamp::of(point.time)),
+        frame_id: frame_id.to_owned(),
+        position: Some(xyz(s.position)?),
+        velocity: Some(xyz(s.velocity)?),
         acceleration: s.acceleration.and_then(xyz),
         position_sigma: xyz(s.position_sigma),
         velocity_sigma: xyz(s.velocity_sigma),
@@ -49,10 +68,10 @@ fn point_message(point: &TrackPoint, frame_id: &str, context: &Context<'_>) -> O
         position_upper: edge(1.0),
         speed: micro(s.velocity.iter().map(|v| v * v).sum::<f64>().sqrt()),
         depth: context.surface_at_zero.then(|| micro(-s.position[2])),
-        phase: point.phase.name(),
-        method: point.method.name(),
-        sources: sources.map(|(_, source)| source.name.as_str()).collect(),
-    }))
+        phase: point.phase.name().to_owned(),
+        method: point.method.name().to_owned(),
+        sources: sources.map(|(_, source)| source.name.clone()).collect(),
+    })
 }
 
 /// The messages of a track's points on one topic.
@@ -62,14 +81,15 @@ pub fn track_messages<'a>(
     context: Context<'a>,
 ) -> impl Iterator<Item = Published> + 'a {
     track.points.iter().filter_map(move |point| {
-        let data = point_message(point, &track.frame_id, &context)?;
-        Some(Published { topic, time: point.time, data })
+        let message = point_message(point, &track.frame_id, &context)?;
+        Some(context.publish(topic, point.time, message))
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::log::Encoding;
     use crate::sample::Source;
     use crate::time::Time;
     use crate::track::{Method, Phase, State};
@@ -103,6 +123,8 @@ mod tests {
             t0: zero,
             surface_at_zero,
             log_start: None,
+            encoding: Encoding::Json,
+            geodetic: None,
         };
         let made: Vec<Published> = track_messages(Topic::Track, &track, context).collect();
         serde_json::from_slice(&made[0].data).expect("json")
@@ -129,7 +151,7 @@ mod tests {
 
     #[test]
     fn every_field_that_is_written_stands_in_its_schema() {
-        let channel = Topic::Track.channel("/fused");
+        let channel = Topic::Track.channel("/fused", Encoding::Json);
         let schema: Value = serde_json::from_slice(&channel.schema).expect("json");
         assert_eq!(schema["title"], "trackfuse.TrackPoint");
         let properties = schema["properties"].as_object().expect("an object");

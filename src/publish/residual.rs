@@ -5,25 +5,38 @@
 
 use serde::Serialize;
 
-use super::fields::{Stamp, Xyz, json, rounded};
-use super::{Context, Published, Topic};
+use super::fields::{Stamp, Xyz, rounded};
+use super::payload::Payload;
+use super::{Context, Published, Topic, ros};
 use crate::estimate::coverage::Coverage;
 use crate::quality::{Misfit, Residual};
 
-#[derive(Serialize)]
-struct ResidualMessage<'a> {
-    timestamp: Stamp,
-    frame_id: &'a str,
-    source: &'a str,
+#[derive(Serialize, prost::Message)]
+pub(super) struct ResidualMessage {
+    #[prost(message, optional, tag = "1")]
+    pub(super) timestamp: Option<Stamp>,
+    #[prost(string, tag = "2")]
+    pub(super) frame_id: String,
+    #[prost(string, tag = "3")]
+    pub(super) source: String,
+    #[prost(message, optional, tag = "4")]
     #[serde(skip_serializing_if = "Option::is_none")]
-    position_residual: Option<Xyz>,
+    pub(super) position_residual: Option<Xyz>,
+    #[prost(double, optional, tag = "5")]
     #[serde(skip_serializing_if = "Option::is_none")]
-    position_normalised: Option<f64>,
+    pub(super) position_normalised: Option<f64>,
+    #[prost(message, optional, tag = "6")]
     #[serde(skip_serializing_if = "Option::is_none")]
-    velocity_residual: Option<Xyz>,
+    pub(super) velocity_residual: Option<Xyz>,
+    #[prost(double, optional, tag = "7")]
     #[serde(skip_serializing_if = "Option::is_none")]
-    velocity_normalised: Option<f64>,
-    phase: &'a str,
+    pub(super) velocity_normalised: Option<f64>,
+    #[prost(string, tag = "8")]
+    pub(super) phase: String,
+}
+
+impl Payload for ResidualMessage {
+    type Ros = ros::Residual;
 }
 
 /// The messages of residuals.
@@ -37,16 +50,16 @@ pub(super) fn residual_messages<'a>(
         // noise doesn't compress: no more digits than tell one residual from another
         let vector = |m: Misfit| rounded(m.vector, 1e4);
         let normalised = |m: Misfit| Some((m.normalised * 1e3).round() / 1e3).filter(|n| n.is_finite());
-        let data = json(&ResidualMessage {
-            timestamp: residual.time.into(),
-            frame_id,
-            source: &context.sources.get(residual.source)?.name,
+        let message = ResidualMessage {
+            timestamp: Some(Stamp::of(residual.time)),
+            frame_id: frame_id.to_owned(),
+            source: context.sources.get(residual.source)?.name.clone(),
             position_residual: position.and_then(vector),
             position_normalised: position.and_then(normalised),
             velocity_residual: velocity.and_then(vector),
             velocity_normalised: velocity.and_then(normalised),
-            phase: Coverage::phase(residual.seen_by).name(),
-        });
-        Some(Published { topic: Topic::Residuals, time: residual.time, data })
+            phase: Coverage::phase(residual.seen_by).name().to_owned(),
+        };
+        Some(context.publish(Topic::Residuals, residual.time, message))
     })
 }

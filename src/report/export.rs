@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::csv;
+use crate::export::csv;
 use crate::source::Recorded;
 
 /// The report of `export`: the table itself, or where it was written. Nanoseconds are strings, since JSON numbers
@@ -16,6 +16,8 @@ pub struct ExportReport {
     pub log: String,
     /// The topic of the track.
     pub topic: String,
+    /// What it was written as: `csv`, `parquet`, `geojson`, `kml` or `tum`.
+    pub format: String,
     /// T0, ns since the epoch of the track's clock.
     pub t0_ns: String,
     /// Frame of the track.
@@ -37,11 +39,12 @@ pub struct ExportReport {
 impl ExportReport {
     /// The report on a track, without its rows and without an output.
     #[must_use]
-    pub fn new(log: String, topic: &str, track: &Recorded) -> Self {
+    pub fn new(log: String, topic: &str, format: &str, track: &Recorded) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION").into(),
             log,
             topic: topic.into(),
+            format: format.into(),
             t0_ns: track.origin().ns().to_string(),
             frame_id: track.track.frame_id.clone(),
             output: None,

@@ -3,8 +3,8 @@
 mod amount;
 mod comparison;
 mod comparison_text;
-pub mod csv;
 mod export;
+pub mod html;
 pub mod inspection;
 mod proposal;
 mod registration;

@@ -20,6 +20,11 @@ pub struct RestoreReport {
     pub additions_taken_off: usize,
     /// How many earlier ones are still in the output.
     pub additions_left: usize,
+    /// Whether the original's data section is as its checksum says: `right` or `wrong`; `not checked` where it has
+    /// none, in place, and after a run that was cut off.
+    pub data_section: String,
+    /// What a person must read.
+    pub warnings: Vec<String>,
 }
 
 #[cfg(test)]

@@ -11,13 +11,11 @@ use serde_json::{Value, json};
 
 use super::bystanders;
 use super::error::SimulateError;
-use super::scenario::Scenario;
-use super::sensors::{SensorRecord, SensorSample};
+use super::scenario::{RecordingScenario, Scenario};
+use super::sensor_channel::sensor_channel;
+use super::sensors::SensorRecord;
 use super::{Simulation, simulate};
 use crate::time::Time;
-
-/// The frame of all positions: east, north, up.
-const FRAME: &str = "enu";
 
 /// A channel and its messages, before they are put in order.
 pub(super) struct Channel {
@@ -32,16 +30,24 @@ pub(super) struct Channel {
 pub(super) struct Schema {
     name: &'static str,
     encoding: &'static str,
-    text: String,
+    data: Vec<u8>,
 }
 
 impl Schema {
     pub(super) fn json(name: &'static str, schema: &Value) -> Self {
-        Self { name, encoding: "jsonschema", text: schema.to_string() }
+        Self { name, encoding: "jsonschema", data: schema.to_string().into_bytes() }
+    }
+
+    pub(super) fn ros1(name: &'static str, definition: &str) -> Self {
+        Self { name, encoding: "ros1msg", data: definition.as_bytes().to_vec() }
     }
 
     pub(super) fn ros2(name: &'static str, definition: &str) -> Self {
-        Self { name, encoding: "ros2msg", text: definition.to_owned() }
+        Self { name, encoding: "ros2msg", data: definition.as_bytes().to_vec() }
+    }
+
+    pub(super) fn protobuf(name: &'static str, descriptors: &[u8]) -> Self {
+        Self { name, encoding: "protobuf", data: descriptors.to_vec() }
     }
 }
 
@@ -83,13 +89,16 @@ pub fn write_simulation<W: Write + Seek>(
 ) -> Result<(), SimulateError> {
     let made_by = scenario.to_toml()?;
     let release = Time::from_ns(scenario.epoch_ns);
+    let RecordingScenario { encoding, bystanders, .. } = scenario.recording;
     let mut channels: Vec<Channel> =
-        simulation.sensors.iter().map(|sensor| track_channel(sensor, release)).collect();
-    if scenario.recording.bystanders {
+        simulation.sensors.iter().map(|sensor| sensor_channel(sensor, encoding, release)).collect();
+    if bystanders {
         channels.extend(bystanders::channels(scenario, simulation));
     }
 
     let mut log = mcap::WriteOptions::new()
+        // the bystanders are in encodings of their own
+        .profile(if bystanders { "" } else { encoding.profile() })
         .library(concat!("trackfuse ", env!("CARGO_PKG_VERSION")))
         .chunk_size(Some(u64::from(scenario.recording.chunk_bytes)))
         .compression(Some(mcap::Compression::Zstd))
@@ -121,8 +130,8 @@ fn write_messages<W: Write + Seek>(
 ) -> Result<(), SimulateError> {
     let mut ordered = Vec::new();
     for channel in channels {
-        let Schema { name, encoding, text } = &channel.schema;
-        let schema_id = log.add_schema(name, encoding, text.as_bytes())?;
+        let Schema { name, encoding, data } = &channel.schema;
+        let schema_id = log.add_schema(name, encoding, data)?;
         let id = log.add_channel(schema_id, channel.topic, channel.encoding, &channel.metadata)?;
         ordered.extend(channel.messages.iter().map(|message| (id, message)));
     }
@@ -142,45 +151,10 @@ fn write_messages<W: Write + Seek>(
     Ok(())
 }
 
-fn track_channel(sensor: &SensorRecord, release: Time) -> Channel {
-    let (topic, title) = match sensor.name.as_str() {
-        "tether" => ("/tether/track", "draw-wire gauge"),
-        "beacon" => ("/beacon/track", "acoustic beacon"),
-        _ => ("/reference/ins", "inertial reference"),
-    };
-    Channel {
-        topic,
-        encoding: "json",
-        schema: Schema::json("trackfuse.TrackSample", &track_schema()),
-        metadata: BTreeMap::from([("sensor".to_owned(), title.to_owned())]),
-        messages: sensor.samples.iter().map(|sample| track_message(sample, release)).collect(),
-    }
-}
-
-fn track_message(sample: &SensorSample, release: Time) -> Message {
-    let stamp = release.plus_seconds(sample.stamp_s);
-    let value = json!({
-        "timestamp": stamp_json(stamp),
-        "frame_id": FRAME,
-        "position": vector_json(&sample.position),
-        "velocity": vector_json(&sample.velocity),
-    });
-    Message {
-        log_time: release.plus_seconds(sample.receive_s),
-        publish_time: stamp,
-        data: value.to_string().into_bytes(),
-    }
-}
-
 /// `{sec, nsec}` of an instant.
 pub(super) fn stamp_json(time: Time) -> Value {
     let (sec, nsec) = time.to_stamp();
     json!({ "sec": sec, "nsec": nsec })
-}
-
-/// `{x, y, z}` to a millionth, as a recorder would write it.
-fn vector_json(v: &Vector3<f64>) -> Value {
-    json!({ "x": round(v.x, 1e6), "y": round(v.y, 1e6), "z": round(v.z, 1e6) })
 }
 
 /// To the nearest `1 / parts`; never the negative zero, which JSON would show.
@@ -208,27 +182,6 @@ pub(super) fn time_schema() -> Value {
             "nsec": { "type": "integer", "minimum": 0, "maximum": 999_999_999 },
         },
     })
-}
-
-fn vector_schema(description: &str) -> Value {
-    let number = || json!({ "type": "number" });
-    json!({
-        "type": "object",
-        "description": description,
-        "properties": { "x": number(), "y": number(), "z": number() },
-    })
-}
-
-fn track_schema() -> Value {
-    object_schema(
-        "trackfuse.TrackSample",
-        &json!({
-            "timestamp": time_schema(),
-            "frame_id": { "type": "string", "description": "frame of position and velocity" },
-            "position": vector_schema("position in m; z = 0 is the sea's surface"),
-            "velocity": vector_schema("velocity in m/s"),
-        }),
-    )
 }
 
 fn record<const N: usize>(name: &str, entries: [(&str, String); N]) -> Metadata {

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::climb_scenario::ClimbScenario;
 use super::error::SimulateError;
+use super::sensor_channel::SensorEncoding;
 use super::sensor_scenario::{ErrorsScenario, SensorScenario};
 
 /// A run to simulate. Same scenario, same log, to the byte.
@@ -71,6 +72,9 @@ impl Default for Scenario {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RecordingScenario {
+    /// What the sensors' messages are encoded in. Without bystanders the log has the encoding's profile.
+    #[serde(skip_serializing_if = "SensorEncoding::is_default")]
+    pub encoding: SensorEncoding,
     /// How long before the release the recording begins, s.
     pub lead_s: f64,
     /// How long it goes on after T3, s.
@@ -88,6 +92,7 @@ pub struct RecordingScenario {
 impl Default for RecordingScenario {
     fn default() -> Self {
         Self {
+            encoding: SensorEncoding::Json,
             lead_s: 5.0,
             tail_s: 5.0,
             bystanders: true,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::SourceError;
 use super::load::{Loaded, SigmaOrigin, Timing};
-use super::reading::{Clock, Fault, Measured, Outcome, Reading};
+use super::reading::{Clock, Fault, Measured, Outcome, Reading, sum};
 use crate::config::SourceConfig;
 use crate::estimate::noise;
 use crate::log::decode::{DecodeError, MessagePath};
@@ -24,7 +24,8 @@ pub(super) struct Gathered {
     readings: [Vec<Reading>; 2],
     delays_s: Vec<f64>,
     clocks: [usize; 3],
-    frame_id: Option<String>,
+    /// The frames that the messages of positions and of velocities name first.
+    frame_ids: [Option<String>; 2],
     pub(super) messages: usize,
     pub(super) undecodable: Option<(usize, DecodeError)>,
     faults: BTreeMap<&'static str, usize>,
@@ -50,7 +51,7 @@ impl Gathered {
             readings: [Vec::new(), Vec::new()],
             delays_s: Vec::new(),
             clocks: [0; 3],
-            frame_id: None,
+            frame_ids: [None, None],
             messages: 0,
             undecodable: None,
             faults: BTreeMap::new(),
@@ -67,11 +68,11 @@ impl Gathered {
             Clock::Log => 2,
         }] += 1;
         self.delays_s.push(outcome.delay_s);
-        if self.frame_id.is_none() {
-            self.frame_id = outcome.frame_id;
-        }
         for (quantity, result) in outcome.vectors {
             let q = quantity as usize;
+            if self.frame_ids[q].is_none() {
+                self.frame_ids[q].clone_from(&outcome.frame_id);
+            }
             match result {
                 Ok(reading) => {
                     if let Some(last) = self.readings[q].last() {
@@ -170,6 +171,7 @@ impl Gathered {
 
     /// The samples; latitudes and longitudes count from `fix_origin` (degrees and m).
     pub(super) fn finish(mut self, origin: Time, fix_origin: Option<[f64; 3]>) -> Loaded {
+        let notes: Vec<String> = self.turn_offsets().into_iter().collect();
         let warnings = self.warnings();
         let fix_origin = fix_origin.filter(|_| self.first_fix().is_some());
         let local = LocalFrame::new(Geodetic::from_degrees(fix_origin.unwrap_or_default()));
@@ -183,8 +185,8 @@ impl Gathered {
                     Measured::Vector(value) => value,
                     Measured::Fix(place) => local.to_enu(place),
                 };
-                let is_position = quantity == Quantity::Position;
-                if is_position { std::array::from_fn(|i| value[i] + offset_m[i]) } else { value }
+                let is_whole = quantity == Quantity::Velocity || reading.offset_is_turned;
+                if is_whole { value } else { sum(value, offset_m) }
             };
             let configured = match quantity {
                 Quantity::Position => self.config.position_sigma_m,
@@ -201,6 +203,7 @@ impl Gathered {
         let median = |delays: &[f64]| robust::median(&mut delays.to_vec()).unwrap_or(0.0);
         let last_third = self.delays_s.len() - third;
         let delay_growth_s = median(&self.delays_s[last_third..]) - median(&self.delays_s[..third]);
+        let frame_id = self.frame_ids.iter_mut().find_map(Option::take);
         let timing = Timing {
             clock: used.join("+"),
             delay_growth_s,
@@ -211,12 +214,36 @@ impl Gathered {
             config: self.config.clone(),
             source,
             // the frame that a fix names is the receiver's, not the one its metres are in
-            frame_id: fix_origin.map_or(self.frame_id.unwrap_or_default(), |_| "enu".to_owned()),
+            frame_id: fix_origin.map_or(frame_id.unwrap_or_default(), |_| "enu".to_owned()),
             fix_origin,
             timing,
             sigma,
+            notes,
             warnings,
         }
+    }
+
+    /// Leaves out positions without an orientation to turn their offset by where others have one; where none has, says
+    /// that it is added as it is.
+    fn turn_offsets(&mut self) -> Option<String> {
+        let positions = &mut self.readings[Quantity::Position as usize];
+        if self.config.offset_m == [0.0; 3] || positions.is_empty() {
+            return None;
+        }
+        let before = positions.len();
+        if positions.iter().any(|reading| reading.offset_is_turned) {
+            positions.retain(|reading| reading.offset_is_turned);
+            let lost = before - positions.len();
+            if lost > 0 {
+                self.faults.insert("no orientation of unit length to turn `offset_m` by", lost);
+            }
+            return None;
+        }
+        let name = printable(&self.config.name);
+        Some(format!(
+            "{name}: `offset_m` is added as it is, along the track's axes: the positions come without an orientation to \
+             turn it by"
+        ))
     }
 
     fn warnings(&self) -> Vec<String> {
@@ -231,6 +258,15 @@ impl Gathered {
         if self.untimed > 0 {
             warnings
                 .push(format!("{name}: {} messages are left out: they have no usable time", self.untimed));
+        }
+        if let ([Some(of_position), Some(of_velocity)], None) = (&self.frame_ids, self.config.velocity_frame)
+            && of_position != of_velocity
+            && self.first_fix().is_none()
+        {
+            warnings.push(format!(
+                "{name}: its positions are in {of_position:?}, its velocities in {of_velocity:?}: they are taken as if along the \
+                 same axes; `velocity_frame = \"world\"` says that they are"
+            ));
         }
         if self.clocks.iter().filter(|n| **n > 0).count() > 1 {
             let [stamp, publish, log] = self.clocks;

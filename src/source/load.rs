@@ -65,6 +65,8 @@ pub struct Loaded {
     pub timing: Timing,
     /// Median standard deviation over axes and samples, m and m/s, and where it comes from.
     pub sigma: [Option<(f64, SigmaOrigin)>; 2],
+    /// What is worth knowing of how it was read, a sentence each.
+    pub notes: Vec<String>,
     /// What a person must read, a sentence each.
     pub warnings: Vec<String>,
 }

@@ -5,6 +5,7 @@
 //! is one way in.
 
 mod candidate;
+mod events;
 mod fix;
 mod gathered;
 mod glimpse;
@@ -16,6 +17,7 @@ mod recorded;
 mod topic;
 
 pub use candidate::{Candidate, Judged, Judgement, Unfit, judge};
+pub use events::{RecordedEvent, recorded_events};
 pub use glimpse::{Glimpse, glimpse};
 pub use load::{Loaded, Samples, SigmaOrigin, Timing, datum, load};
 pub use propose::{Proposal, propose, propose_chosen};
@@ -77,7 +79,7 @@ pub enum SourceError {
         error: PathError,
     },
     /// The log has no such topic.
-    #[error("source {name:?}: topic {topic:?} is not in the log; it has: {}", some_of(topics))]
+    #[error("{}topic {topic:?} is not in the log; it has: {}", of_source(name, topic), some_of(topics))]
     NoTopic {
         /// The source.
         name: String,
@@ -168,6 +170,15 @@ pub enum SourceError {
         /// What its messages hold.
         found: String,
     },
+    /// Two topics that are to be one source, but are not a position and a velocity.
+    #[error(
+        "{} and {} are not one source: expected a topic with a position and one with a velocity",
+        candidates[0], candidates[1]
+    )]
+    NoPair {
+        /// What the topics hold.
+        candidates: Box<[Candidate; 2]>,
+    },
     /// Two of what there can be one of.
     #[error(
         "the {what} of the reference is given twice, by {} and by {}; expected one",
@@ -213,9 +224,16 @@ impl SourceError {
             Self::Unrecognised { log, candidates, .. } if !candidates.is_empty() => choose_hint(log),
             Self::Ambiguous { ambiguity } => choose_hint(&ambiguity.log),
             Self::NoTopic { topic, topics, .. } => {
-                let near = topics.iter().map(|t| (strsim::jaro_winkler(topic, t), t));
-                let (score, nearest) = near.max_by(|a, b| a.0.total_cmp(&b.0))?;
-                (score > 0.8).then(|| format!("did you mean {nearest:?}?"))?
+                if let Some(nearest) = nearest(topic, topics) {
+                    return Some(format!("did you mean {nearest:?}?"));
+                }
+                if topic != "/fused/track" {
+                    return None;
+                }
+                "`trackfuse fuse LOG` writes it: give the log that it wrote, or name another topic".into()
+            }
+            Self::Miss { miss: PathMiss::Field { field, available, .. }, .. } => {
+                format!("did you mean `{}`?", printable(nearest(field, available)?))
             }
             Self::NoOrientation { .. } => {
                 "`velocity_frame = \"world\"` in this source says that nothing need be turned".into()
@@ -251,6 +269,18 @@ impl SourceError {
             _ => true,
         }
     }
+}
+
+/// The name that is so near to `asked` that it was meant.
+fn nearest<'a>(asked: &str, known: &'a [String]) -> Option<&'a str> {
+    let near = known.iter().map(|name| (strsim::jaro_winkler(asked, name), name));
+    let (score, name) = near.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (score > 0.8).then_some(name)
+}
+
+/// Which source is spoken of, unless it has no other name than the topic.
+fn of_source(name: &str, topic: &str) -> String {
+    if name == topic { String::new() } else { format!("source {name:?}: ") }
 }
 
 fn choose_hint(log: &str) -> String {

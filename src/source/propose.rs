@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::candidate::of_topic;
 use super::recognise::source_of;
+use super::topic::sensor_words;
 use super::{
     Ambiguity, Candidate, Recognised, Samples, SourceError, choices_of, datum, glimpse, is_datum_like, load,
     recognise,
@@ -67,18 +68,59 @@ pub fn propose(log: &Log, prefix: &str) -> Result<Proposal, SourceError> {
     checked(log, &recognised)
 }
 
-/// The sources of the topics that a person chose, the datum first.
+/// The sources that a person chose, the datum first: each a topic, or two with a comma between them, of which one
+/// holds its position and the other its velocity. Topics whose names say so are of one sensor too: see [`paired`].
 ///
 /// # Errors
 /// [`SourceError::NoTopic`], [`SourceError::Decode`], [`SourceError::NoVectors`] for a topic that can't be one;
 /// [`SourceError::Log`].
 pub fn propose_chosen(log: &Log, topics: &[String]) -> Result<Proposal, SourceError> {
-    let candidates: Vec<Candidate> = topics.iter().map(|t| of_topic(log, t)).collect::<Result<_, _>>()?;
+    let mut candidates = Vec::new();
+    for text in topics {
+        let of_log = |topic: &str| log.index().channels_of(topic).next().is_some();
+        candidates.push(match text.split_once(',') {
+            Some((first, second)) if !of_log(text) => both(of_topic(log, first)?, of_topic(log, second)?)?,
+            _ => of_topic(log, text)?,
+        });
+    }
+    let candidates = paired(candidates);
     let mut sources: Vec<SourceConfig> = choices_of(&candidates).iter().map(source_of).collect();
     if let Some(first) = sources.first_mut() {
         first.datum = true;
     }
     checked(log, &Recognised { sources, ..Recognised::default() })
+}
+
+/// One source of two topics.
+fn both(first: Candidate, second: Candidate) -> Result<Candidate, SourceError> {
+    let joined = joined(&first, &second).or_else(|| joined(&second, &first));
+    joined.ok_or_else(|| SourceError::NoPair { candidates: [first, second].into() })
+}
+
+/// The position of `of_position` with the velocity of `of_velocity`: what else they hold is not used.
+fn joined(of_position: &Candidate, of_velocity: &Candidate) -> Option<Candidate> {
+    let (position, velocity) = (of_position.position.clone()?, of_velocity.velocity.clone()?);
+    Some(Candidate { topic: of_position.topic.clone(), position: Some(position), velocity: Some(velocity) })
+}
+
+/// A topic that holds a position alone and one that holds a velocity alone are one source where their names differ in
+/// nothing but what they measure, as `/gps/pose` and `/gps/twist` do, and no third one's name is the same.
+fn paired(candidates: Vec<Candidate>) -> Vec<Candidate> {
+    let mut sensors: Vec<(BTreeSet<String>, Vec<Candidate>)> = Vec::new();
+    for candidate in candidates {
+        let words = sensor_words(&candidate.topic);
+        match sensors.iter_mut().find(|(known, _)| !words.is_empty() && *known == words) {
+            Some((_, topics)) => topics.push(candidate),
+            None => sensors.push((words, vec![candidate])),
+        }
+    }
+    let one_each = |(_, topics): (_, Vec<Candidate>)| match topics.as_slice() {
+        [a, b] if [a, b].iter().all(|c| c.position.is_none() || c.velocity.is_none()) => {
+            joined(a, b).or_else(|| joined(b, a)).map_or(topics, |one| vec![one])
+        }
+        _ => topics,
+    };
+    sensors.into_iter().flat_map(one_each).collect()
 }
 
 /// The sources with what stands against them.

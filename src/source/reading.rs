@@ -34,6 +34,8 @@ pub(super) struct Reading {
     pub(super) value: Measured,
     /// From the message's covariance, where it gives one.
     pub(super) sigma: Option<[f64; 3]>,
+    /// Whether the message's orientation turned the offset that is in its position.
+    pub(super) offset_is_turned: bool,
 }
 
 /// What a message says of a place or a velocity.
@@ -97,6 +99,7 @@ pub(super) struct Reader {
     time: Option<TimeChoice>,
     latency_s: f64,
     axes: Axes,
+    offset_m: [f64; 3],
 }
 
 /// One vector that the messages hold.
@@ -106,7 +109,7 @@ struct Vector {
     path: MessagePath,
     /// Where its covariance may stand: the path, and the stride of the diagonal.
     covariances: Vec<MessagePath>,
-    /// Where the orientation may stand that turns it, for body-frame velocities; empty for others.
+    /// Where the orientation may stand that turns a body-frame velocity, or a position's offset; empty for others.
     orientations: Vec<MessagePath>,
 }
 
@@ -141,13 +144,16 @@ impl Reader {
         let mut vectors = Vec::new();
         for (quantity, path) in paths.iter().filter(|(_, path)| path.topic == channel.topic) {
             let position = paths.iter().find(|(q, p)| *q == Quantity::Position && p.topic == channel.topic);
-            let is_turned = body && *quantity == Quantity::Velocity;
+            let is_turned = match quantity {
+                Quantity::Position => config.offset_m != [0.0; 3],
+                Quantity::Velocity => body,
+            };
             let beside = |name| position.and_then(|(_, position)| sibling(position, 1, name));
             let usual = || ORIENTATIONS.iter().filter(|_| position.is_none()).map(|fields| root(fields));
             let orientations: Vec<_> =
                 ["orientation", "rotation"].into_iter().filter_map(beside).chain(usual()).collect();
             let orientations: Vec<_> = orientations.into_iter().filter(|p| is_turned && known(p)).collect();
-            if is_turned && orientations.is_empty() {
+            if is_turned && *quantity == Quantity::Velocity && orientations.is_empty() {
                 let (name, path) = (config.name.clone(), path.to_string());
                 return Err(SourceError::NoOrientation { name, path });
             }
@@ -167,6 +173,7 @@ impl Reader {
             time: config.time,
             latency_s: config.latency_s,
             axes: config.axes,
+            offset_m: config.offset_m,
         })
     }
 
@@ -214,26 +221,42 @@ impl Reader {
             .map(|variances| variances.map(f64::sqrt));
         if let (Quantity::Position, Some(place)) = (vector.quantity, fix(at)) {
             let sigma = sigma.filter(|_| !covariance_is_unknown(at));
-            return Ok(Reading { time, value: Measured::Fix(place?), sigma });
+            return Ok(Reading { time, value: Measured::Fix(place?), sigma, offset_is_turned: false });
         }
         let mut value = at.as_vector3().ok_or_else(|| no_vector(&vector.path, at))?;
-        if !vector.orientations.is_empty() {
-            let turn = |path: &MessagePath| path.resolve(message).ok().flatten().and_then(rotation);
-            let turn = vector.orientations.iter().find_map(turn).ok_or(Fault::NoOrientation)?;
-            value = turn(value);
-            // turned, the axes mix: one sigma for all keeps the total
-            sigma = sigma.map(|s| [(s.iter().map(|s| s * s).sum::<f64>() / 3.0).sqrt(); 3]);
+        let turn = |path: &MessagePath| path.resolve(message).ok().flatten().and_then(rotation);
+        let turn = vector.orientations.iter().find_map(turn);
+        let offset_is_turned = vector.quantity == Quantity::Position && turn.is_some();
+        match turn {
+            Some(turn) if offset_is_turned => value = sum(value, turn(self.offset_m)),
+            Some(turn) => {
+                let turned = turn(value);
+                if turned != value {
+                    // the axes mix: one sigma for all keeps the total
+                    sigma = sigma.map(|s| [(s.iter().map(|s| s * s).sum::<f64>() / 3.0).sqrt(); 3]);
+                }
+                value = turned;
+            }
+            None if vector.quantity == Quantity::Velocity && !vector.orientations.is_empty() => {
+                return Err(Fault::NoOrientation);
+            }
+            None => {}
         }
         if self.axes == Axes::Ned {
             value = [value[1], value[0], -value[2]];
             sigma = sigma.map(|s| [s[1], s[0], s[2]]);
         }
         if value.iter().all(|v| v.is_finite()) {
-            Ok(Reading { time, value: Measured::Vector(value), sigma })
+            Ok(Reading { time, value: Measured::Vector(value), sigma, offset_is_turned })
         } else {
             Err(Fault::NotFinite)
         }
     }
+}
+
+/// The sum of two vectors.
+pub(super) fn sum(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| a[i] + b[i])
 }
 
 fn no_vector(path: &MessagePath, found: &Value) -> Fault {

@@ -7,11 +7,11 @@ use super::candidate::{Candidate, Judged, Judgement, judge};
 use super::topic::{is_datum_like, is_reference, sensor_word};
 use super::{Ambiguity, SourceError, Unfit};
 use crate::config::SourceConfig;
-use crate::log::{Log, bad_chunks, passed_over};
+use crate::log::{Log, LogError, passed_over};
 use crate::printable::printable;
 
 /// What a log's topics say.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Debug, Default)]
 pub struct Recognised {
     /// The sources, as a config would name them; the datum first.
     pub sources: Vec<SourceConfig>,
@@ -19,8 +19,8 @@ pub struct Recognised {
     pub unused: Vec<Candidate>,
     /// Sensors that can't be read, a sentence each.
     pub warnings: Vec<String>,
-    /// Where chunks begin that can't be decoded, as far as they were met.
-    pub bad_chunks: BTreeSet<u64>,
+    /// What could not be read of the parts that were looked into.
+    pub damaged: Vec<LogError>,
 }
 
 /// A source as a person may choose it: of several paths one.
@@ -53,7 +53,7 @@ pub fn recognise(log: &Log, prefix: &str) -> Result<Recognised, SourceError> {
     match judgement.sources() {
         Ok(mut recognised) if !judgement.channels.iter().any(lost) => {
             recognised.warnings.splice(..0, passed_over(&judgement.damaged));
-            recognised.bad_chunks = bad_chunks(&judgement.damaged);
+            recognised.damaged = judgement.damaged;
             Ok(recognised)
         }
         // What was not found may be what can't be read.
@@ -137,7 +137,7 @@ impl Judgement {
             })
             .map(|(topic, why)| format!("{} looks like a sensor's and is not used: {why}", printable(topic)))
             .collect();
-        Ok(Recognised { sources, unused, warnings, bad_chunks: BTreeSet::new() })
+        Ok(Recognised { sources, unused, warnings, damaged: Vec::new() })
     }
 }
 

@@ -1,15 +1,16 @@
 //! Tracks and references out of a log: the way back from channels to what estimators make.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
 
 use super::SourceError;
 use super::candidate::of_topic;
-use super::load::{Loaded, Samples, load};
+use super::load::{Loaded, Samples, SigmaOrigin, load};
 use crate::config::{SourceConfig, TimeChoice};
 use crate::estimate::coverage::{interpolate, max_gap_s};
-use crate::log::decode::{MessagePath, Step};
+use crate::log::decode::{Decoder, MessagePath, Step};
 use crate::log::{Log, LogError, passed_over};
 use crate::sample::Sample;
 use crate::time::Time;
@@ -33,6 +34,8 @@ pub struct Recorded {
     pub fix_origin: Option<[f64; 3]>,
     /// Topics that the track was made of, as the metadata has them.
     pub made_of: Vec<String>,
+    /// What the metadata says of how the track was made, but for the report, which may be long.
+    pub provenance: BTreeMap<String, String>,
     /// What a person must read, a sentence each.
     pub warnings: Vec<String>,
 }
@@ -51,10 +54,50 @@ impl Recorded {
 /// [`SourceError`], as [`load`].
 pub fn recorded(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
     let index = log.index();
-    let schema = |c| index.schema_of(c).map(|s| s.name.as_str());
-    let own =
-        index.channels_of(topic).find(|c| c.message_encoding == "json" && schema(c) == Some(TRACK_SCHEMA));
-    if own.is_some() { own_track(log, topic) } else { foreign_track(log, topic) }
+    let is_own = |c| index.schema_of(c).is_some_and(|s| s.name == TRACK_SCHEMA);
+    let mut recorded =
+        if index.channels_of(topic).any(is_own) { own_track(log, topic) } else { foreign_track(log, topic) }?;
+    let prefix = topic.rsplit_once('/').map_or(topic, |(prefix, _)| prefix);
+    if let Some(mut metadata) = log.metadata(&format!("trackfuse:{prefix}"))? {
+        recorded.t0 = t0_of(&metadata);
+        recorded.fix_origin = recorded.fix_origin.or(config_of(&metadata).output.origin);
+        recorded.made_of = topics_of(&metadata);
+        metadata.remove("report");
+        recorded.provenance = metadata;
+    }
+    Ok(recorded)
+}
+
+/// The decoders of a log's channels; those that can't be had are left out.
+fn decoders(log: &Log, channels: &BTreeSet<u16>) -> BTreeMap<u16, Decoder> {
+    let index = log.index();
+    let decoder = |id: &u16| {
+        let channel = index.channels.get(id)?;
+        let schema = index.schema_of(channel);
+        let (encoding, name, data) =
+            schema.map_or(("", "", &[][..]), |s| (s.encoding.as_str(), s.name.as_str(), s.data.as_slice()));
+        Some((*id, Decoder::new(&channel.message_encoding, encoding, name, data).ok()?))
+    };
+    channels.iter().filter_map(decoder).collect()
+}
+
+/// The decoders of channels that are not JSON.
+pub(super) fn other_decoders(log: &Log, channels: &BTreeSet<u16>) -> BTreeMap<u16, Decoder> {
+    let mut decoders = decoders(log, channels);
+    decoders.retain(|id, _| log.index().channels[id].message_encoding != "json");
+    decoders
+}
+
+/// A message that this program wrote, in whatever encoding.
+pub(super) fn own_message<T: DeserializeOwned>(decoder: Option<&Decoder>, data: &[u8]) -> Result<T, String> {
+    match decoder {
+        // straight, since tracks are long
+        None => serde_json::from_slice(data).map_err(|e| e.to_string()),
+        Some(decoder) => {
+            let value = decoder.decode(data).map_err(|e| e.to_string())?;
+            serde_json::from_value(value.to_json()).map_err(|e| e.to_string())
+        }
+    }
 }
 
 /// Reads what a track is to be held against: topics, or message paths of a position and of a velocity.
@@ -136,14 +179,23 @@ struct PointMessage {
     sources: Vec<String>,
 }
 
+/// `google.protobuf.Timestamp` and ROS 2 have names of their own.
 #[derive(Deserialize)]
-struct Stamp {
+pub(super) struct Stamp {
+    #[serde(alias = "seconds")]
     sec: i64,
+    #[serde(alias = "nanos", alias = "nanosec")]
     nsec: u32,
 }
 
+impl Stamp {
+    pub(super) fn time(&self) -> Option<Time> {
+        Time::from_stamp(self.sec, self.nsec.into())
+    }
+}
+
 #[derive(Deserialize)]
-struct Xyz {
+pub(super) struct Xyz {
     x: f64,
     y: f64,
     z: f64,
@@ -156,12 +208,13 @@ impl From<Xyz> for [f64; 3] {
 }
 
 fn own_track(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
-    let channels = log.index().channels_of(topic).map(|c| c.id).collect();
+    let channels: BTreeSet<u16> = log.index().channels_of(topic).map(|c| c.id).collect();
+    let decoders = other_decoders(log, &channels);
     let mut names = Names::default();
     let mut track = Track { frame_id: String::new(), points: Vec::new() };
     let (mut unreadable, mut reason) = (0_usize, String::new());
     let read = log.for_each_message(&channels, |message| {
-        let read = serde_json::from_slice::<PointMessage>(message.data).map_err(|e| e.to_string());
+        let read = own_message(decoders.get(&message.channel_id), message.data);
         match read.and_then(|point| names.point(point, &mut track.frame_id)) {
             Ok(point) => track.points.push(point),
             Err(error) => {
@@ -183,15 +236,14 @@ fn own_track(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
     if unreadable > 0 {
         warnings.push(format!("{unreadable} messages of {topic} are left out: {reason}"));
     }
-    let prefix = topic.rsplit_once('/').map_or(topic, |(prefix, _)| prefix);
-    let metadata = log.metadata(&format!("trackfuse:{prefix}"))?.unwrap_or_default();
     Ok(Recorded {
         track,
         sources: names.list,
         has_phases: true,
-        t0: t0_of(&metadata),
-        fix_origin: config_of(&metadata).output.origin,
-        made_of: topics_of(&metadata),
+        t0: None,
+        fix_origin: None,
+        made_of: Vec::new(),
+        provenance: BTreeMap::new(),
         warnings,
     })
 }
@@ -221,9 +273,8 @@ impl Names {
             *frame_id = message.frame_id;
         }
         let known = |v: Option<Xyz>| v.map_or([f64::NAN; 3], <[f64; 3]>::from);
-        let time = Time::from_stamp(message.timestamp.sec, message.timestamp.nsec.into());
         Ok(TrackPoint {
-            time: time.ok_or("a timestamp past the year 2262")?,
+            time: message.timestamp.time().ok_or("a timestamp past the year 2262")?,
             state: State {
                 position: message.position.into(),
                 velocity: message.velocity.into(),
@@ -286,18 +337,23 @@ fn foreign_track(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
     let velocities = &loaded.source.velocities;
     let gap_s = max_gap_s(velocities);
     let unknown = [f64::NAN; 3];
-    let point = |p: &Sample| TrackPoint {
-        time: origin.plus_seconds(p.time_s),
-        state: State {
-            position: p.value,
-            velocity: interpolate(velocities, p.time_s, gap_s).map_or(unknown, |v| v.value),
-            acceleration: None,
-            position_sigma: unknown,
-            velocity_sigma: unknown,
-        },
-        phase: Phase::Single,
-        method: Method::default(),
-        seen_by: 1,
+    // what the scatter tells is not what the track says of itself
+    let is_given = loaded.sigma.map(|sigma| sigma.is_some_and(|(_, from)| from == SigmaOrigin::Messages));
+    let point = |p: &Sample| {
+        let velocity = interpolate(velocities, p.time_s, gap_s);
+        TrackPoint {
+            time: origin.plus_seconds(p.time_s),
+            state: State {
+                position: p.value,
+                velocity: velocity.map_or(unknown, |v| v.value),
+                acceleration: None,
+                position_sigma: if is_given[0] { p.sigma } else { unknown },
+                velocity_sigma: velocity.filter(|_| is_given[1]).map_or(unknown, |v| v.sigma),
+            },
+            phase: Phase::Single,
+            method: Method::default(),
+            seen_by: 1,
+        }
     };
     let points: Vec<TrackPoint> = loaded.source.positions.iter().map(point).collect();
     if points.is_empty() {
@@ -311,6 +367,7 @@ fn foreign_track(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
         t0: None,
         fix_origin: loaded.fix_origin,
         made_of: topics_among([loaded.config.position, loaded.config.velocity]),
+        provenance: BTreeMap::new(),
         warnings: loaded.warnings,
     })
 }

@@ -1,5 +1,7 @@
 //! What topics' names say: which sensor, whether a reference, whether a position or a velocity.
 
+use std::collections::BTreeSet;
+
 use crate::sample::Quantity;
 
 /// Words of class I sensors, the default datum, then those of class II. The second number of each is
@@ -31,6 +33,14 @@ pub(super) fn vector_is(topic: &str, quantity: Quantity) -> bool {
         Quantity::Velocity => of_velocity,
         Quantity::Position => any_of(&["pos", "position", "fix", "point"]) && !of_velocity,
     }
+}
+
+/// The words of a topic, but for those that say what is measured: those of one sensor's topics are the same.
+pub(super) fn sensor_words(topic: &str) -> BTreeSet<String> {
+    const MEASURED: [&str; 10] =
+        ["pose", "pos", "position", "fix", "point", "twist", "vel", "velocity", "speed", "linear"];
+    let words = topic.split(|c: char| !c.is_alphanumeric()).map(str::to_lowercase);
+    words.filter(|w| !w.is_empty() && !MEASURED.contains(&w.as_str())).collect()
 }
 
 /// What stands before the first sensor's word of a topic, and the word with the digits behind it.
@@ -89,6 +99,17 @@ mod tests {
         assert_eq!(name("/lbl/fix").as_deref(), Some("lbl"));
         assert_eq!(name("/cub1/pose"), None);
         assert_ne!(sensor_word("/a/beacon/pose"), sensor_word("/b/beacon/pose"));
+    }
+
+    #[test]
+    fn topics_that_differ_in_what_they_measure_alone_are_of_one_sensor() {
+        let same = |a: &str, b: &str| sensor_words(a) == sensor_words(b);
+        assert!(same("/gps1/pose", "/gps1/twist"));
+        assert!(same("/local_position/pose", "/local_position/velocity_local"));
+        assert!(same("/rov/usbl_position", "/rov/usbl/vel"));
+        assert!(!same("/rov/usbl_position", "/rov/dvl_velocity"));
+        assert!(!same("/gps1/pose", "/gps2/twist"));
+        assert!(sensor_words("/fix").is_empty());
     }
 
     #[test]

@@ -194,3 +194,75 @@ fn exit_code_3_for_an_overlap_at_constant_velocity_that_does_not_separate_bias_a
     assert_says(&ran.stderr, &["warning: ", "don't separate the bias of beacon from its clock offset"]);
     assert_says(&ran.stdout, &["z only together with beacon's clock offset"]);
 }
+
+#[test]
+fn an_error_of_a_user_in_a_hurry_has_a_hint() {
+    let trial = Trial::of(two_sensors());
+    let hint = |args: &[&str], code: i32, hint: &str| {
+        let ran = trackfuse(trial.folder(), args);
+        assert_eq!(ran.code, code, "{ran:#?}");
+        assert!(ran.stderr.starts_with("error: "), "{ran:#?}");
+        assert_says(&ran.stderr, &[&format!("\nhint: {hint}")]);
+    };
+    fs::create_dir(trial.path("folder")).unwrap();
+    fs::copy(trial.path("in.mcap"), trial.path("folder/dive.mcap")).unwrap();
+    fs::write(trial.path("empty.mcap"), "").unwrap();
+    fs::write(trial.path("path.toml"), "[[source]]\nname = \"a\"\nposition = \"/tether/track.positon\"\n")
+        .unwrap();
+    hint(&["fuse", "inn.mcap"], 1, "did you mean in.mcap?");
+    hint(&["fuse", "folder"], 1, "it holds folder/dive.mcap");
+    hint(&["inspect", "no/such.mcap"], 1, "there is no folder no");
+    hint(&["fuse", "empty.mcap"], 1, "its recording, or its copy, never began");
+    hint(&["fuse", "path.toml"], 1, "the log comes first; a config goes behind `--config`");
+    hint(&["fuse", "in.mcap", "-c", "none.toml"], 2, "a config is a TOML file: `trackfuse init");
+    hint(&["fuse", "in.mcap", "-c", "in.mcap"], 2, "a config is a TOML file: `trackfuse init");
+    hint(&["fuse", "in.mcap", "-c", "path.toml"], 2, "did you mean `position`?");
+    hint(&["fuse", "in.mcap", "-o", "no/such/out.mcap"], 1, "`mkdir -p no/such` makes it");
+    hint(&["fuse", "in.mcap", "-o", "folder"], 1, "`-o` names a file");
+    hint(&["export", "in.mcap"], 2, "`trackfuse fuse LOG` writes it");
+    hint(&["simulate", "none.toml", "-o", "x.mcap"], 2, "a scenario is a TOML file");
+}
+
+#[test]
+fn what_is_no_terminal_sees_no_colours_and_the_version_names_the_commit_if_any() {
+    let trial = Trial::of(two_sensors());
+    let ran = trackfuse(trial.folder(), &["fuse", "none.mcap"]);
+    assert!(!ran.stderr.contains('\x1b'), "{ran:#?}");
+    let version = trackfuse(trial.folder(), &["--version"]).stdout;
+    let rest = version.strip_prefix(concat!("trackfuse ", env!("CARGO_PKG_VERSION"))).unwrap().trim_end();
+    let commit = rest.strip_prefix(" (").and_then(|r| r.strip_suffix(')')).map(|c| c.trim_end_matches('+'));
+    assert!(rest.is_empty() || commit.is_some_and(|c| c.chars().all(|c| c.is_ascii_hexdigit())), "{version}");
+}
+
+#[test]
+fn every_command_has_examples_in_its_help_a_manual_page_and_completions() {
+    let trial = Trial::of(two_sensors());
+    let help = trackfuse(trial.folder(), &["--help"]).stdout;
+    let listed = help.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
+    let name = |line: &str| {
+        line.strip_prefix("  ")
+            .filter(|l| !l.starts_with(' '))
+            .map(|l| l.split(' ').next().unwrap().to_owned())
+    };
+    let names: Vec<String> = listed.lines().filter_map(name).filter(|name| name != "help").collect();
+    assert!(names.len() > 8, "{names:?}");
+    fs::create_dir(trial.path("man")).unwrap();
+    assert_eq!(trackfuse(trial.folder(), &["man", "-o", "man"]).code, 0);
+    let completions = trackfuse(trial.folder(), &["completions", "bash"]).stdout;
+    for name in names {
+        let help = trackfuse(trial.folder(), &[&name, "--help"]).stdout;
+        assert_says(&help, &["Examples:\n", &format!("trackfuse {name}")]);
+        let page = fs::read_to_string(trial.path(&format!("man/trackfuse-{name}.1"))).unwrap();
+        assert_says(&page, &[".SH SYNOPSIS", "Examples:"]);
+        assert_says(&completions, &[&name]);
+    }
+    assert!(
+        trackfuse(trial.folder(), &["man"]).stdout
+            == fs::read_to_string(trial.path("man/trackfuse.1")).unwrap()
+    );
+    assert_eq!(
+        trackfuse(trial.folder(), &["man", "-o", "man"]).code,
+        2,
+        "pages that are there are not replaced unasked"
+    );
+}

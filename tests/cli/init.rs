@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::output::validate;
 use super::trial::{Output, Trial, assert_says, logs, trackfuse};
-use super::trial_log::{Sensor, TrialLog, changed, two_sensors};
+use super::trial_log::{Sensor, TrialLog, changed, ns, stamp, two_sensors, xyz};
 
 /// The track of the log without a config and with the one that `init` makes for it; and the exit codes of `init`
 /// and the two runs.
@@ -145,6 +145,50 @@ fn init_comments_the_channels_that_are_not_used_and_they_can_be() {
     let (report, _) = Trial::of(log).config(&chosen(&made.stdout)).report(0);
     let names: Vec<_> = report["sources"].as_array().unwrap().iter().map(|s| &s["name"]).collect();
     assert_eq!(names, ["tether", "rov"]);
+}
+
+/// A vehicle's positions and velocities on topics of their own, without a word of a sensor in their names.
+fn split(topics: [&str; 2]) -> Trial {
+    let mut log = TrialLog::new();
+    for (t, p, v) in Sensor::new(0.0, 8.0, 1).samples() {
+        log.json(topics[0], t, &json!({"timestamp": stamp(ns(t)), "position": xyz(p)}));
+        log.json(topics[1], t, &json!({"timestamp": stamp(ns(t)), "velocity": xyz(v)}));
+    }
+    Trial::of(log.finish())
+}
+
+#[test]
+fn init_makes_one_source_of_a_position_and_a_velocity_that_are_of_one_sensor() {
+    let cases: [([&str; 2], &[&str], usize); 4] = [
+        // their names say so
+        (["/gps/pose", "/gps/twist"], &["--source", "/gps/pose", "--source", "/gps/twist"], 1),
+        (["/gps/pose", "/gps/twist"], &["--source", "/gps/twist", "--source", "/gps/pose"], 1),
+        // the user says so
+        (["/usbl_p", "/dvl_v"], &["--source", "/dvl_v,/usbl_p"], 1),
+        // nobody does
+        (["/usbl_p", "/dvl_v"], &["--source", "/usbl_p", "--source", "/dvl_v"], 2),
+    ];
+    for (topics, args, count) in cases {
+        let trial = split(topics);
+        let made = trackfuse(trial.folder(), &[&["init", "in.mcap", "-o", "trial.toml"], args].concat());
+        assert_eq!((made.code, made.stderr.as_str()), (0, ""), "{args:?}: {made:#?}");
+        let (report, _) = trial.report(0);
+        let sources = report["sources"].as_array().unwrap();
+        assert_eq!(sources.len(), count, "{args:?}");
+        if count == 1 {
+            assert_eq!(sources[0]["position"], format!("{}.position", topics[0]));
+            assert_eq!(sources[0]["velocity"], format!("{}.velocity", topics[1]));
+        }
+    }
+    let trial = split(["/usbl_p", "/dvl_v"]);
+    let refused = trackfuse(trial.folder(), &["init", "in.mcap", "--source", "/usbl_p,/usbl_p"]);
+    assert_eq!(refused.code, 2, "{refused:#?}");
+    assert_says(
+        &refused.stderr,
+        &["/usbl_p (position) and /usbl_p (position) are not one source", "one with a velocity"],
+    );
+    let unknown = trackfuse(trial.folder(), &["init", "in.mcap", "--source", "/usbl_p,/dvl"]);
+    assert_says(&unknown.stderr, &["\"/dvl\" is not in the log", "hint: did you mean \"/dvl_v\"?"]);
 }
 
 #[test]

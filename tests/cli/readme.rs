@@ -1,4 +1,4 @@
-//! The README's command does what the README says. `TRACKFUSE_UPDATE_README=1` writes its output anew.
+//! The pages' commands do what the pages say. `TRACKFUSE_UPDATE_README=1` writes their outputs anew.
 
 use std::fs;
 use std::path::Path;
@@ -6,8 +6,8 @@ use std::path::Path;
 use super::trial::trackfuse;
 
 /// The commands that run in a clone, each with the output that follows it.
-fn examples(readme: &str) -> Vec<(&str, &str)> {
-    let commands = readme.split("\n```sh\ncargo run --release -- ").skip(1);
+fn examples(page: &str) -> Vec<(&str, &str)> {
+    let commands = page.split("\n```sh\ncargo run --release -- ").skip(1);
     let examples = commands.filter_map(|rest| {
         let (command, rest) = rest.split_once("\n```\n")?;
         Some((command, rest.split_once("```text\n")?.1.split_once("```\n")?.0))
@@ -16,9 +16,8 @@ fn examples(readme: &str) -> Vec<(&str, &str)> {
 }
 
 #[test]
-fn readme_commands_print_what_the_readme_shows_and_again_when_run_again() {
+fn commands_of_the_pages_print_what_the_pages_show_and_again_when_run_again() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let readme = fs::read_to_string(root.join("README.md")).unwrap();
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("sample_logs")).unwrap();
     for entry in fs::read_dir(root.join("sample_logs")).unwrap() {
@@ -27,15 +26,26 @@ fn readme_commands_print_what_the_readme_shows_and_again_when_run_again() {
             fs::copy(entry.path(), folder.path().join("sample_logs").join(entry.file_name())).unwrap();
         }
     }
-    let output = || fs::read(folder.path().join("sample_logs/steep_climb.fused.mcap")).unwrap();
-    let mut updated = readme.clone();
-    let examples = examples(&readme);
-    assert!(examples.len() > 1);
+    for page in ["README.md", "docs/logs.md"] {
+        let stored = fs::read_to_string(root.join(page)).unwrap();
+        let updated = checked(&stored, folder.path());
+        if updated != stored {
+            fs::write(root.join(page), updated).unwrap();
+        }
+    }
+}
+
+/// The page, with its outputs made anew where that is asked for; fails where they differ and it isn't.
+fn checked(page: &str, folder: &Path) -> String {
+    let output = || fs::read(folder.join("sample_logs/steep_climb.fused.mcap")).ok();
+    let mut updated = page.to_owned();
+    let examples = examples(page);
+    assert!(!examples.is_empty());
     for (command, shown) in examples {
         let args: Vec<&str> = command.split(' ').collect();
-        let first = trackfuse(folder.path(), &args);
+        let first = trackfuse(folder, &args);
         let bytes = output();
-        let second = trackfuse(folder.path(), &args);
+        let second = trackfuse(folder, &args);
         assert_eq!(first.code, 0, "{first:#?}");
         assert_eq!((first.code, &first.stdout), (second.code, &second.stdout));
         assert!(bytes == output(), "the output differs from run to run");
@@ -47,11 +57,9 @@ fn readme_commands_print_what_the_readme_shows_and_again_when_run_again() {
         } else {
             assert_eq!(
                 first.stdout, shown,
-                "the README's output differs; hint: TRACKFUSE_UPDATE_README=1 writes it anew"
+                "the page's output differs; hint: TRACKFUSE_UPDATE_README=1 writes it anew"
             );
         }
     }
-    if updated != readme {
-        fs::write(root.join("README.md"), updated).unwrap();
-    }
+    updated
 }

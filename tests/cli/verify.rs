@@ -69,3 +69,11 @@ fn verify_of_what_is_no_log_fails_like_inspect() {
     assert_eq!(ran.code, 1);
     assert!(ran.stderr.starts_with("error: "), "{ran:#?}");
 }
+
+#[test]
+fn verify_takes_no_more_into_memory_than_it_is_allowed_to() {
+    let trial = Trial::of(two_sensors());
+    let ran = trackfuse(trial.folder(), &["inspect", "in.mcap", "--verify", "--memory-limit", "4000B"]);
+    assert_eq!(ran.code, 3, "{ran:#?}");
+    assert_says(&ran.stdout, &[" bytes, more than the limit of 4000, and was not looked into"]);
+}

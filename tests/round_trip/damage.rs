@@ -20,7 +20,7 @@ use super::raw::{
 };
 
 /// Messages of two channels, `bytes_each` long, in chunks of `chunk_bytes`.
-fn log_of(options: WriteOptions, messages: u64, bytes_each: usize, chunk_bytes: u64) -> Vec<u8> {
+pub(super) fn log_of(options: WriteOptions, messages: u64, bytes_each: usize, chunk_bytes: u64) -> Vec<u8> {
     let mut writer = options.chunk_size(Some(chunk_bytes)).create(Cursor::new(Vec::new())).unwrap();
     let schema = writer.add_schema("Test", "jsonschema", b"{}").unwrap();
     let ids = ["/a", "/b"].map(|topic| writer.add_channel(schema, topic, "json", &BTreeMap::new()).unwrap());

@@ -10,65 +10,69 @@ use super::raw::told_by_stream;
 
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
-fn record(opcode: u8, body: &[&[u8]]) -> Vec<u8> {
+pub(super) fn record(opcode: u8, body: &[&[u8]]) -> Vec<u8> {
     let body = body.concat();
     [&[opcode][..], &(body.len() as u64).to_le_bytes(), &body].concat()
 }
 
-fn text(text: &[u8]) -> Vec<u8> {
+pub(super) fn text(text: &[u8]) -> Vec<u8> {
     [&(text.len() as u32).to_le_bytes()[..], text].concat()
 }
 
-fn channel(id: u16, schema: u16, topic: &[u8]) -> Vec<u8> {
+pub(super) fn channel(id: u16, schema: u16, topic: &[u8]) -> Vec<u8> {
     let (id, schema) = (id.to_le_bytes(), schema.to_le_bytes());
     record(0x04, &[&id, &schema, &text(topic), &text(b"json"), &text(b"")])
 }
 
-fn message(channel: u16, time: u64) -> Vec<u8> {
+pub(super) fn message(channel: u16, time: u64) -> Vec<u8> {
     let time = time.to_le_bytes();
     record(0x05, &[&channel.to_le_bytes(), &[0; 4], &time, &time, b"{}"])
 }
 
 /// A chunk that claims `size` bytes of records.
-fn chunk(size: u64, compression: &[u8], data: &[u8]) -> Vec<u8> {
+pub(super) fn chunk(size: u64, compression: &[u8], data: &[u8]) -> Vec<u8> {
     let len = (data.len() as u64).to_le_bytes();
     record(0x06, &[&[0; 16], &size.to_le_bytes(), &[0; 4], &text(compression), &len, data])
 }
 
 /// A log of these records in the data section, and no summary.
-fn log_of(records: &[Vec<u8>]) -> Vec<u8> {
+pub(super) fn log_of(records: &[Vec<u8>]) -> Vec<u8> {
     let header = record(0x01, &[&text(b""), &text(b"")]);
     let end = [record(0x0f, &[&[0; 4]]), record(0x02, &[&[0; 20]])].concat();
     [MAGIC, &header, &records.concat(), &end, MAGIC].concat()
 }
 
-struct Opened {
-    dir: tempfile::TempDir,
-    log: Log,
+pub(super) struct Opened {
+    pub(super) dir: tempfile::TempDir,
+    pub(super) log: Log,
     bytes: Vec<u8>,
 }
 
-fn opened(bytes: Vec<u8>) -> Opened {
+pub(super) fn opened(bytes: Vec<u8>) -> Opened {
+    opened_with(bytes, ReadOptions::default()).unwrap()
+}
+
+pub(super) fn opened_with(bytes: Vec<u8>, options: ReadOptions) -> Result<Opened, LogError> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("in.mcap");
     fs::write(&path, &bytes).unwrap();
-    Opened { log: Log::open(path).unwrap(), dir, bytes }
+    Ok(Opened { log: Log::open_with(path, options)?, dir, bytes })
 }
 
 impl Opened {
     /// Times of all messages that can be read, and how many parts can't.
-    fn times(&self) -> (Vec<u64>, usize) {
+    pub(super) fn times(&self) -> (Vec<u64>, usize) {
         let mut times = Vec::new();
         let all = (0..=u16::MAX).collect();
         let read = self.log.for_each_message_of_excerpt(&all, u64::MAX, |m| times.push(m.log_time));
         (times, read.damaged.len())
     }
 
-    fn said(&self) -> String {
+    pub(super) fn said(&self) -> String {
         self.log.damage().iter().map(|damage| format!("{damage}\n")).collect()
     }
 
-    fn append(&self) -> PathBuf {
+    pub(super) fn append(&self) -> PathBuf {
         let out = self.dir.path().join("out.mcap");
         let to = Destination::new_file(&out);
         let mut appender =
@@ -199,4 +203,42 @@ fn nothing_but_damage_is_opened_and_added_to() {
     assert_eq!(told_by_stream(&out).len(), 1);
     let strict = log.log.ensure_whole().unwrap_err();
     assert!(matches!(strict, LogError::NotWhole { .. }) && strict.hint().is_some());
+}
+
+/// A schema whose definition has `len` bytes.
+fn schema(id: u16, len: usize) -> Vec<u8> {
+    record(0x03, &[&id.to_le_bytes(), &text(b"S"), &text(b"e"), &text(&vec![0; len])])
+}
+
+#[test]
+fn definitions_that_are_kept_count_together_against_the_limit_and_repeated_ones_once() {
+    let options = ReadOptions { memory_limit: 100_000, ..ReadOptions::default() };
+    let packed = |id| {
+        let schema = schema(id, 70_000);
+        chunk(schema.len() as u64, b"zstd", &zstd::encode_all(&schema[..], 3).unwrap())
+    };
+    let many = log_of(&(1..=40).map(packed).collect::<Vec<_>>());
+    assert!(many.len() < 12_000, "{}", many.len());
+    let loose = log_of(&(1..=40).map(|id| schema(id, 70_000)).collect::<Vec<_>>());
+    for bytes in [many, loose] {
+        match opened_with(bytes, options.clone()).map(|opened| opened.said()) {
+            Err(error @ LogError::TooLarge { .. }) => assert!(error.hint().is_some()),
+            other => panic!("{other:?}"),
+        }
+    }
+    let repeated = [vec![schema(1, 70_000); 40], vec![channel(1, 1, b"/a"), message(1, 1)]].concat();
+    let log = opened_with(log_of(&repeated), options.clone()).unwrap();
+    assert_eq!((log.log.index().schemas.len(), log.times()), (1, (vec![1], 0)));
+    let repeated = log_of(&vec![packed(1); 40]);
+    assert_eq!(opened_with(repeated, options).unwrap().log.index().schemas.len(), 1);
+}
+
+#[test]
+fn sixty_thousand_chunks_that_cannot_be_decoded_are_passed_over() {
+    let mut bad = chunk(3, b"", b"abc");
+    // its checksum
+    bad[9 + 24] = 1;
+    let bytes = log_of(&[channel(1, 0, b"/a"), bad.repeat(60_000)]);
+    let log = opened(bytes);
+    assert!(log.log.index().chunks.is_empty() && log.said().contains("the chunk's CRC"));
 }

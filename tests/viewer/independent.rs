@@ -30,6 +30,18 @@ fn an_independent_check_finds_nothing_wrong_with_the_fused_sample_logs_and_somet
         }
     }
     let folder = tempfile::tempdir().unwrap();
+    for encoding in ["protobuf", "cdr"] {
+        let log = folder.path().join(encoding);
+        let config = folder.path().join("trial.toml");
+        fs::write(&config, format!("[output]\nencoding = \"{encoding}\"\norigin = [59.4, 10.5, 3.0]\n"))
+            .unwrap();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_trackfuse"));
+        command.args(["fuse", "--quiet", "sample_logs/steep_climb.mcap", "--config"]).arg(config);
+        command.current_dir(env!("CARGO_MANIFEST_DIR")).arg("-o").arg(&log);
+        assert!(matches!(command.output().unwrap().status.code(), Some(0 | 3)));
+        let (code, said) = check(&log);
+        assert!(code == Some(0) && said.contains("/fused/geojson"), "{encoding}: {said}");
+    }
     let cut = folder.path().join("cut.mcap");
     let whole = fs::read(fused(NAMES[0])).unwrap();
     fs::write(&cut, &whole[..whole.len() / 2]).unwrap();

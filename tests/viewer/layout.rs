@@ -102,7 +102,7 @@ fn layout_message_paths_lead_to_values_in_a_fused_sample_log() {
                     assert!(config["paths"].as_array().is_some_and(|p| !p.is_empty()));
                 }
                 "RosOut" => assert_eq!(topics[text(config, "topicToRender")].schema, "foxglove.Log"),
-                "3D" => {}
+                "3D" | "map" => {}
                 _ => panic!("{id}: a panel that nothing is known of"),
             }
         }
@@ -124,6 +124,22 @@ fn layout_draws_the_scene_and_the_pose_in_their_frame() {
     }
     for path in ["/fused/scene.entities[0].frame_id", "/fused/pose.frame_id"] {
         assert_eq!(values(&topics, path)[0], decode::Value::Text(text(space, "followTf").into()), "{path}");
+    }
+}
+
+#[test]
+fn layout_map_has_the_tracks_place_in_its_middle() {
+    let topics = topics("steep_climb");
+    let map = &layout()["configById"]["map!track"];
+    for (topic, schema) in [("/fused/fix", "foxglove.LocationFix"), ("/fused/geojson", "foxglove.GeoJSON")] {
+        assert_eq!(topics[topic].schema, schema);
+        assert!(map["topicColors"].get(topic).is_some());
+    }
+    for (path, key) in [("/fused/fix.latitude", "lat"), ("/fused/fix.longitude", "lon")] {
+        let center = map["center"][key].as_f64().unwrap();
+        let values = values(&topics, path);
+        // a picture of zoom 17 is some 500 m wide
+        assert!(values.iter().all(|v| (v.as_f64().unwrap() - center).abs() < 0.002), "{path}: {values:?}");
     }
 }
 

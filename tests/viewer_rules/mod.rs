@@ -11,6 +11,7 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::Value;
+use trackfuse::log::decode::Decoder;
 
 /// A log that spans more than this has a message with a time of another epoch.
 const LONGEST_NS: u64 = 365 * 86_400 * 1_000_000_000;
@@ -41,7 +42,7 @@ fn added_prefixes(log: &[u8]) -> Vec<String> {
 
 /// Everything about the topics that `is_judged` names which a viewer would not show, a sentence each:
 ///
-/// 1. JSON messages with JSON Schemas whose name is their title.
+/// 1. JSON messages with JSON Schemas whose name is their title; other messages with what decodes them.
 /// 2. Schemas hold to the subset that viewers read.
 /// 3. Messages are JSON that fits its schema; quaternions are of unit length.
 /// 4. Chunks, their indexes, statistics, and a summary that has every schema and channel.
@@ -62,6 +63,7 @@ pub(crate) fn violations(log: &[u8], is_judged: impl Fn(&str) -> bool) -> Vec<St
             schemas.insert(channel.id, schema);
         }
     }
+    let decoders = decoders(&summary, &is_judged, &mut found);
     let mut times: BTreeSet<u64> = BTreeSet::new();
     let (mut frames, mut scenes) = (Frames::default(), BTreeMap::<String, usize>::new());
     let (mut count, mut judged) = (0, 0);
@@ -75,6 +77,14 @@ pub(crate) fn violations(log: &[u8], is_judged: impl Fn(&str) -> bool) -> Vec<St
         };
         count += 1;
         let (topic, name) = (&message.channel.topic, message.channel.schema.as_ref().map(|s| s.name.clone()));
+        if let Some(decoder) = decoders.get(&message.channel.id) {
+            times.insert(message.log_time);
+            judged += 1;
+            match decoder.decode(&message.data) {
+                Ok(value) => check_quaternions(&value.to_json(), topic, &mut found),
+                Err(error) => found.add(3, format!("{topic}: {error}")),
+            }
+        }
         let value: Result<Value, _> = serde_json::from_slice(&message.data);
         if let (Some("foxglove.FrameTransform"), Ok(value)) = (name.as_deref(), &value) {
             frames.connect(value);
@@ -170,7 +180,7 @@ fn check_index(log: &[u8], summary: &mcap::Summary, found: &mut Violations) {
 fn check_channel(channel: &mcap::Channel<'_>, found: &mut Violations) -> Option<Value> {
     let topic = &channel.topic;
     if channel.message_encoding != "json" {
-        // others are read in their own way; what is added is JSON
+        // others are read in their own way
         return None;
     }
     let Some(schema) = &channel.schema else {
@@ -193,6 +203,27 @@ fn check_channel(channel: &mcap::Channel<'_>, found: &mut Violations) -> Option<
         return None;
     }
     Some(text)
+}
+
+/// Of channels of other encodings than JSON.
+fn decoders(
+    summary: &mcap::Summary,
+    is_judged: impl Fn(&str) -> bool,
+    found: &mut Violations,
+) -> BTreeMap<u16, Decoder> {
+    let mut decoders = BTreeMap::new();
+    let others = summary.channels.values().filter(|c| c.message_encoding != "json" && is_judged(&c.topic));
+    for channel in others {
+        let made = match &channel.schema {
+            Some(s) => Decoder::new(&channel.message_encoding, &s.encoding, &s.name, &s.data),
+            None => Decoder::new(&channel.message_encoding, "", "", &[]),
+        };
+        match made {
+            Ok(decoder) => _ = decoders.insert(channel.id, decoder),
+            Err(error) => found.add(1, format!("{}: {error}", channel.topic)),
+        }
+    }
+    decoders
 }
 
 fn check_quaternions(value: &Value, topic: &str, found: &mut Violations) {

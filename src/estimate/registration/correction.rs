@@ -5,7 +5,8 @@ use super::{Anchor, Registered, SourceErrors};
 use crate::sample::{Quantity, Sample, Source};
 
 impl Registered {
-    /// The sources with their errors taken off, without rejected samples, their sigmas as the noise was found to be.
+    /// The sources with their errors taken off, without rejected samples and mirrored axes, their sigmas as the noise was
+    /// found to be.
     ///
     /// `sources` are those that were registered.
     #[must_use]
@@ -14,6 +15,10 @@ impl Registered {
         let mut corrected = Vec::with_capacity(sources.len());
         for (s, source) in sources.iter().enumerate() {
             let mut kept = Source { name: source.name.clone(), ..Source::default() };
+            if self.mirrored[s].is_some() {
+                corrected.push(kept);
+                continue;
+            }
             for quantity in Quantity::ALL {
                 let scale = self.noise[s][quantity as usize].scale;
                 for (index, sample) in source.series(quantity).iter().enumerate() {

@@ -8,6 +8,7 @@ use super::noise::Level;
 use super::normal::{Normal, Weighted, motion};
 use super::relaxation::Relaxation;
 use super::residuals::Residuals;
+use super::rotation::Frame;
 use super::selection::{self, Averaged, Inclusion};
 use super::smoothing::likeliest_lambda;
 use super::start::Guess;
@@ -60,8 +61,8 @@ pub(super) struct Fit<'a> {
     /// The penalty's weights in time, by function.
     pub(super) jerk_weights: Vec<f64>,
     pub(super) references: Vec<Reference>,
-    /// Whether the source's rotation is looked for.
-    pub(super) rotated: Vec<bool>,
+    /// The frames that the sources began in whose rotation is looked for.
+    pub(super) frames: Vec<Option<Frame>>,
     /// Whether outliers are looked for among the source's samples.
     pub(super) robust: Vec<bool>,
     pub(super) layout: Layout,
@@ -213,9 +214,9 @@ impl<'a> Fit<'a> {
                     Kind::Bias | Kind::Drift => measures[0],
                     Kind::VelocityBias => measures[1],
                     Kind::ClockOffset | Kind::Scale => self.posterior.is_some(),
-                    Kind::Rotation => self.rotated[source] && self.posterior.is_some(),
+                    Kind::Rotation => self.frames[source].is_some() && self.posterior.is_some(),
                 };
-                if acts && self.settings.kinds.contains(&kind) {
+                if acts && measures.contains(&true) && self.settings.kinds.contains(&kind) {
                     active.push(index(slot, kind, axis));
                 }
             }
@@ -307,10 +308,12 @@ impl<'a> Fit<'a> {
 
     fn put_anchors_on_curve(&mut self) {
         let Some(posterior) = &self.posterior else { return };
-        for reference in &mut self.references {
+        for (reference, frame) in self.references.iter_mut().zip(&self.frames) {
             let mut active = Active::default();
             self.knots.evaluate(reference.anchor.time_s, &mut active);
-            reference.anchor.point_m = motion(&posterior.coefficients, &active, reference.centre)[0];
+            let point_m = motion(&posterior.coefficients, &active, reference.centre)[0];
+            reference.anchor.point_m = point_m;
+            reference.image_m = frame.map_or(point_m, |frame| frame.image(point_m));
         }
     }
 

@@ -32,7 +32,7 @@
 //! | `noise`, `residuals` | noise levels as variance components, outliers by a mixture of scales, correlated noise widens |
 //! | `selection` | which errors there are, by evidence, averaged (MacKay 1992; Madigan, Raftery 1994) |
 //! | `separation` | which unknowns the data can tell apart |
-//! | `clock`, `rotation` | where to begin with a clock that is far off, and with a large angle (Procrustes) |
+//! | `clock`, `rotation` | where to begin with a clock that is far off, and with a turned frame (Procrustes); axes that are mirrored |
 //!
 //! Only differences are seen: an error that all sources share, or one of the datum, stays in the track and in no
 //! band.
@@ -60,8 +60,11 @@ mod unknowns;
 pub use curve::RegisteredCurve;
 pub use model::Anchor;
 pub use noise::Level;
+pub use rotation::Mirrored;
 pub use separation::{Name, Separation, Unknown};
 pub use unknowns::{Kind, Priors, SourceErrors};
+
+use std::borrow::Cow;
 
 use fit::Fit;
 use start::Guess;
@@ -132,6 +135,8 @@ pub struct Registered {
     pub noise: Vec<[Level; 2]>,
     /// Samples that are no noise, in order of source, quantity and time.
     pub rejected: Vec<Rejected>,
+    /// Sources whose axes are no rotation of the datum's: they are left out.
+    pub mirrored: Vec<Option<Mirrored>>,
     /// Number of knots.
     pub knots: usize,
     /// Weight of the jerk penalty by axis, 1/m^2; about it, the weight varies in time.
@@ -185,23 +190,41 @@ pub fn register(
                 clock::first_offset_s(sources, datum, source, &coverage, &settings.priors);
         }
     }
-    let run = |guesses: &[Guess]| Fit::run(sources, datum, pieces, guesses, settings);
+    let mut mirrored = vec![None; sources.len()];
+    let mut frames: Vec<(usize, rotation::Frame)> = Vec::new();
+    for source in others() {
+        let late = (source, guesses[source].clock_offset_s);
+        mirrored[source] = rotation::mirrored(sources, datum, late, &coverage);
+        if mirrored[source].is_some() {
+            guesses[source] = Guess::default();
+            continue;
+        }
+        if !settings.kinds.contains(&Kind::Rotation) {
+            continue;
+        }
+        let found = rotation::candidates(sources, datum, late, &coverage, &settings.priors);
+        match found.iter().find(|frame| frame.is_clear) {
+            Some(clear) => guesses[source].frame = Some(*clear),
+            None => frames.extend(found.into_iter().map(|frame| (source, frame))),
+        }
+    }
+    let mut kept = Cow::Borrowed(sources);
+    for source in others().filter(|&source| mirrored[source].is_some()) {
+        kept.to_mut()[source] = Source { name: sources[source].name.clone(), ..Source::default() };
+    }
+    let run = |guesses: &[Guess]| Fit::run(&kept, datum, pieces, guesses, settings);
     let mut best = run(&guesses);
-    if settings.kinds.contains(&Kind::Rotation) {
-        for source in others() {
-            let offset_s = guesses[source].clock_offset_s;
-            for angle in rotation::candidates(sources, datum, (source, offset_s), &coverage, &settings.priors)
-            {
-                let mut turned = guesses.clone();
-                turned[source].rotation_rad = Some(angle);
-                let Some(tried) = run(&turned) else { continue };
-                let odds = if guesses[source].rotation_rad.is_some() { 0.0 } else { ROTATION_ODDS };
-                if best.as_ref().is_none_or(|b| tried.log_evidence > b.log_evidence + odds) {
-                    (best, guesses) = (Some(tried), turned);
-                }
-            }
+    for (source, frame) in frames {
+        let mut turned = guesses.clone();
+        turned[source].frame = Some(frame);
+        let Some(tried) = run(&turned) else { continue };
+        let odds = if guesses[source].frame.is_some() { 0.0 } else { ROTATION_ODDS };
+        if best.as_ref().is_none_or(|b| tried.log_evidence > b.log_evidence + odds) {
+            (best, guesses) = (Some(tried), turned);
         }
     }
     let fit = best.ok_or_else(|| undetermined("too few samples, or at too few instants"))?;
-    fit.registered(pieces).ok_or_else(|| undetermined("too few samples, or at too few instants"))
+    let registered = fit.registered(pieces);
+    let found = registered.ok_or_else(|| undetermined("too few samples, or at too few instants"))?;
+    Ok(Registered { mirrored, ..found })
 }

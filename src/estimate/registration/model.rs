@@ -4,10 +4,11 @@
 //!
 //! ```text
 //! stamp = t + tau
-//! R' (position - q) = (1 + c) u + b + r (t - t_m)                                                       (1)
+//! R' (position - q') = (1 + c) u + b + r (t - t_m)                                                      (1)
 //! R' velocity       = (1 + c) v(t) + r + w                                                              (2)
 //! ```
 //!
+//! q' is q, but of a turned source its image in the frame that the fit begins with: R' (q' - q) is added to b in the end.
 //! About tau0, c0, psi0 and a curve p0 these are linear in the spline and in all unknowns; J turns by a right
 //! angle about the vertical:
 //!
@@ -38,6 +39,8 @@ pub struct Anchor {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Reference {
     pub(super) anchor: Anchor,
+    /// The anchor's point as the frame has it that the source is thought to be in: the bias counts from there.
+    pub(super) image_m: [f64; 3],
     pub(super) errors: SourceErrors,
     /// Whether it is the datum, which has no unknowns.
     pub(super) is_datum: bool,
@@ -91,10 +94,15 @@ impl Reference {
     #[inline(always)]
     fn turned_back(&self, quantity: Quantity, value: [f64; 3]) -> [f64; 3] {
         let q = match quantity {
-            Quantity::Position => self.anchor.point_m,
+            Quantity::Position => self.image_m,
             Quantity::Velocity => [0.0; 3],
         };
         turned(std::array::from_fn(|axis| value[axis] - q[axis]), -self.errors.rotation_rad)
+    }
+
+    /// What is to be added to the bias so that it counts from the anchor's point itself, m.
+    pub(super) fn frame_bias_m(&self, rotation_rad: f64) -> [f64; 3] {
+        turned([0, 1, 2].map(|axis| self.image_m[axis] - self.anchor.point_m[axis]), -rotation_rad)
     }
 
     /// What a sample is off by from the model, with the curve's motion at its true instant.

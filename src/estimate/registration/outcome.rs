@@ -3,7 +3,7 @@
 use super::curve::RegisteredCurve;
 use super::fit::Fit;
 use super::separation::{Separation, Unknown, name_of};
-use super::unknowns::{SourceErrors, kind_of};
+use super::unknowns::{Kind, SourceErrors, kind_of};
 use super::{REJECTED_WEIGHT, Registered, Rejected};
 use crate::sample::Quantity;
 
@@ -41,18 +41,31 @@ impl Fit<'_> {
         for (slot, &source) in self.layout.slots.iter().enumerate() {
             sigmas[source] = SourceErrors::of(&deviations, slot);
             errors[source] = SourceErrors::of(&posterior.unknowns, slot);
+            let of_frame = self.references[source].frame_bias_m(errors[source].rotation_rad);
+            let far_m = of_frame[0].hypot(of_frame[1]);
+            for axis in 0..3 {
+                errors[source].bias_m[axis] += of_frame[axis];
+                let turned_m = if axis < 2 { far_m * sigmas[source].rotation_rad } else { 0.0 };
+                sigmas[source].bias_m[axis] = sigmas[source].bias_m[axis].hypot(turned_m);
+            }
         }
         let unknown = |(place, &i): (usize, &usize)| {
             let name = name_of(&self.layout, i);
             let found = self.inclusions.iter().find(|g| g.source == name.source && g.kind == name.kind);
+            let (is_bias, axis) = (name.kind == Kind::Bias, name.axis.unwrap_or(0));
             let (strongest, separation) =
                 self.separations.get(place).copied().unwrap_or((None, Separation::AtPrior));
             Unknown {
                 name,
-                value: posterior.unknowns[i],
-                sigma: deviations[i],
+                value: if is_bias { errors[name.source].bias_m[axis] } else { posterior.unknowns[i] },
+                sigma: if is_bias { sigmas[name.source].bias_m[axis] } else { deviations[i] },
                 prior_sigma: self.settings.priors.of(kind_of(i).0),
-                probability: found.map_or(1.0, |g| g.probability),
+                // a turned frame has a zero of its own
+                probability: if is_bias && self.frames[name.source].is_some() {
+                    1.0
+                } else {
+                    found.map_or(1.0, |g| g.probability)
+                },
                 strongest,
                 separation,
             }
@@ -64,6 +77,7 @@ impl Fit<'_> {
             anchors: self.references.iter().map(|r| r.anchor).collect(),
             noise: self.levels,
             rejected,
+            mirrored: Vec::new(),
             knots: self.knots.count(),
             lambda: self.lambda,
             log_evidence: self.log_evidence,

@@ -7,6 +7,7 @@ use super::knots::Knots;
 use super::model::{Anchor, Reference};
 use super::noise::Level;
 use super::relaxation::Relaxation;
+use super::rotation::Frame;
 use super::unknowns::SourceErrors;
 use crate::estimate::spline;
 use crate::math::robust;
@@ -20,8 +21,8 @@ const FINEST_SPACING_S: f64 = 0.04;
 pub(super) struct Guess {
     /// How late its stamps are, s.
     pub(super) clock_offset_s: f64,
-    /// Its angle against the datum, rad, if one is to be looked for.
-    pub(super) rotation_rad: Option<f64>,
+    /// Its frame, if it is turned.
+    pub(super) frame: Option<Frame>,
 }
 
 impl<'a> Fit<'a> {
@@ -40,9 +41,10 @@ impl<'a> Fit<'a> {
         let centre = middle(sources);
         let reference = |i: usize| Reference {
             anchor: Anchor { time_s: common_s(&sources[i], &sources[datum]), point_m: centre },
+            image_m: guesses[i].frame.map_or(centre, |frame| frame.image(centre)),
             errors: SourceErrors {
                 clock_offset_s: guesses[i].clock_offset_s,
-                rotation_rad: guesses[i].rotation_rad.unwrap_or(0.0),
+                rotation_rad: guesses[i].frame.map_or(0.0, |frame| frame.angle_rad),
                 ..SourceErrors::default()
             },
             is_datum: i == datum,
@@ -56,9 +58,9 @@ impl<'a> Fit<'a> {
             jerk_weights,
             knots,
             references: (0..sources.len()).map(reference).collect(),
-            rotated: guesses.iter().map(|g| g.rotation_rad.is_some()).collect(),
+            frames: guesses.iter().map(|g| g.frame).collect(),
             robust: vec![settings.robust; sources.len()],
-            levels: vec![[Level::default(); 2]; sources.len()],
+            levels: sources.iter().zip(guesses).map(|(source, guess)| first_levels(source, guess)).collect(),
             weights: sources.iter().map(|s| Quantity::ALL.map(|q| vec![1.0; s.series(q).len()])).collect(),
             lambda: [1.0; 3],
             search_decades: [WIDEST_SEARCH; 3],
@@ -73,6 +75,16 @@ impl<'a> Fit<'a> {
             converged: false,
         }
     }
+}
+
+/// The noise to begin with: of a turned source at least what its frame leaves, which the datum's is not to be taken for.
+fn first_levels(source: &Source, guess: &Guess) -> [Level; 2] {
+    let mut levels = [Level::default(); 2];
+    let stated = robust::median(&mut source.positions.iter().map(|s| s.sigma[0]).collect::<Vec<_>>());
+    if let (Some(left_m), Some(stated)) = (guess.frame.and_then(|frame| frame.left_m), stated) {
+        levels[0].scale = (left_m / stated).max(1.0);
+    }
+    levels
 }
 
 /// The fastest source's median interval, but no finer than 0.04 s, and no more knots than the spline's.

@@ -134,7 +134,13 @@ fn solution_and_covariance_equal_those_of_the_dense_stacked_problem() {
     let penalty = knots.jerk_penalty(&jerk_weights);
     let centre = [0.5, 1.0, -20.0];
     let anchor = Anchor { time_s: 5.0, point_m: winding(5.0).0 };
-    let reference = |is_datum| Reference { anchor, errors: SourceErrors::default(), is_datum, centre };
+    let reference = |is_datum| Reference {
+        anchor,
+        image_m: anchor.point_m,
+        errors: SourceErrors::default(),
+        is_datum,
+        centre,
+    };
     let mut references = [reference(true), reference(false)];
     references[1].errors =
         SourceErrors { clock_offset_s: 0.03, scale: 0.001, rotation_rad: 0.02, ..errors() };
@@ -322,7 +328,7 @@ fn a_source_that_the_others_contradict_is_not_believed_where_it_sees_alone() {
         sources[1].series_mut(q).iter_mut().for_each(|s| s.value[2] = -s.value[2]);
     }
     let found = registered(&sources);
-    assert!(found.noise[1][0].scale > 10.0, "{:?}", found.noise);
+    assert_eq!(found.mirrored[1], Some(Mirrored::Vertical));
     for t in [6.5, 7.5, 8.5, 9.5] {
         let state = found.curve.at(t).expect("inside");
         assert!(
@@ -351,6 +357,92 @@ fn frames_that_are_turned_by_128_degrees_are_registered_with_and_without_an_over
                 let error = state.position[axis] - winding(t).0[axis];
                 assert!(error.abs() < 3.5 * state.position_sigma[axis], "{t} s: {error} of {state:?}");
                 assert!(state.position_sigma[axis] < 1.5);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_frame_turned_by_any_angle_is_registered_also_where_its_zero_is_far_from_the_datums() {
+    for (seed, degrees) in (40..).zip([30.0_f64, 90.0, 128.0, 180.0, -150.0]) {
+        let angle = degrees.to_radians();
+        // counted from another place: turned about the datum's zero, not about the anchor
+        for zero_m in [0.0, 60.0] {
+            let errors = SourceErrors { rotation_rad: angle, ..errors() };
+            let mut sources = pair(errors, seed);
+            sources[1].positions.iter_mut().for_each(|s| s.value = [0, 1, 2].map(|a| s.value[a] + zero_m));
+            let found = registered(&sources);
+            let (e, s) = (found.errors[1].rotation_rad, found.sigmas[1].rotation_rad);
+            let off = (e - angle).sin().atan2((e - angle).cos()).abs();
+            assert!(off < 3.0 * s && s < 0.03, "{degrees} deg, {zero_m} m: {e} +- {s}");
+            assert!(found.converged && rmse(&found, winding, 6.0, 10.0) < 0.4, "{degrees} deg, {zero_m} m");
+        }
+    }
+}
+
+#[test]
+fn a_source_at_rest_shows_no_rotation() {
+    for seed in 50..55 {
+        let rest: Path = |_| ([3.0, -2.0, -10.0], [0.0; 3]);
+        let first = Sensor::datum(rest, 0.0, 6.0, seed);
+        let second = Sensor { errors: errors(), middle_s: 5.0, ..Sensor::datum(rest, 4.0, 10.0, seed + 100) };
+        let found = registered(&[first.watch("first"), second.watch("second")]);
+        assert!(found.errors[1].rotation_rad.abs() < f64::MIN_POSITIVE, "seed {seed}: {:?}", found.errors[1]);
+    }
+}
+
+#[test]
+fn a_straight_line_at_constant_speed_shows_the_heading_alone() {
+    let angle = 128.0_f64.to_radians();
+    let first = Sensor::datum(straight, 0.0, 6.0, 8);
+    for (rotation_rad, seed) in [(0.0, 9), (angle, 10)] {
+        let errors = SourceErrors { rotation_rad, ..errors() };
+        let second = Sensor { errors, middle_s: 5.0, ..Sensor::datum(straight, 4.0, 10.0, seed) };
+        let found = registered(&[first.watch("first"), second.watch("second")]);
+        let (e, s) = (found.errors[1].rotation_rad, found.sigmas[1].rotation_rad);
+        assert!((e - rotation_rad).abs() < 3.0 * s + f64::MIN_POSITIVE, "{rotation_rad}: {e} +- {s}");
+    }
+}
+
+/// What is done to every vector of a source.
+type Change = fn([f64; 3]) -> [f64; 3];
+
+/// Two sources that overlap from 0.5 to 6 s, the second's vectors `changed`.
+fn with_second(seed: u64, changed: Change) -> Vec<Source> {
+    let second =
+        Sensor { errors: errors(), middle_s: 3.25, ..Sensor::datum(winding, 0.5, 10.0, seed + 1000) };
+    let mut sources = vec![Sensor::datum(winding, 0.0, 6.0, seed).watch("first"), second.watch("second")];
+    for q in Quantity::ALL {
+        sources[1].series_mut(q).iter_mut().for_each(|s| s.value = changed(s.value));
+    }
+    sources
+}
+
+#[test]
+fn mirrored_axes_are_told_and_never_registered_as_a_rotation() {
+    let cases: [(Change, Option<Mirrored>); 5] = [
+        (|[x, y, z]| [y, x, -z], Some(Mirrored::Ned)),
+        (|[x, y, z]| [-x, y, z], Some(Mirrored::Level)),
+        (|[x, y, z]| [y, x, z], Some(Mirrored::Level)),
+        (|[x, y, z]| [x, y, -z], Some(Mirrored::Vertical)),
+        (|[x, y, z]| [-y, x, z], None),
+    ];
+    for (seed, (changed, mirrored)) in (60..).zip(cases) {
+        let sources = with_second(seed, changed);
+        let found = registered(&sources);
+        assert_eq!(found.mirrored, [None, mirrored], "seed {seed}");
+        if mirrored.is_some() {
+            assert!(found.errors[1].rotation_rad.abs() < f64::MIN_POSITIVE, "seed {seed}");
+            assert!(found.corrected(&sources)[1].is_empty() && found.unknowns.is_empty(), "seed {seed}");
+        }
+        for t in if mirrored.is_some() { [1.0, 2.0, 4.0, 5.5] } else { [6.5, 7.5, 8.5, 9.5] } {
+            let state = found.curve.at(t).expect("inside");
+            for axis in 0..3 {
+                let error = state.position[axis] - winding(t).0[axis];
+                assert!(
+                    error.abs() < 4.0 * state.position_sigma[axis],
+                    "seed {seed}, {t} s: {error}, {state:?}"
+                );
             }
         }
     }

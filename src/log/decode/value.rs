@@ -92,6 +92,24 @@ impl Value {
         }
     }
 
+    /// The same as JSON, which has no NaN and no infinities: null.
+    #[must_use]
+    pub fn to_json(&self) -> serde_json::Value {
+        match self {
+            Self::Null => serde_json::Value::Null,
+            Self::Bool(truth) => (*truth).into(),
+            Self::Int(i) => (*i).into(),
+            Self::Uint(u) => (*u).into(),
+            Self::Float(f) => (*f).into(),
+            Self::Text(text) => text.as_str().into(),
+            Self::Bytes(bytes) => bytes.as_slice().into(),
+            Self::Array(items) => items.iter().map(Self::to_json).collect(),
+            Self::Object(fields) => {
+                fields.iter().map(|(name, value)| (name.to_string(), value.to_json())).collect()
+            }
+        }
+    }
+
     /// What kind of value this is, in words for a message to the user.
     #[must_use]
     pub fn kind(&self) -> &'static str {

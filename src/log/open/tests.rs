@@ -1,10 +1,14 @@
 //! Logs that are whole, leave things out, or are damaged.
 
-use std::{collections::BTreeSet, panic::catch_unwind};
+use std::{
+    collections::BTreeSet,
+    panic::catch_unwind,
+    sync::{Arc, Mutex},
+};
 
 use super::super::fixture::{PRIVATE, chunked, log, on_disk, records, without_summary_crc};
 use super::super::index::LeftOut;
-use super::super::{Appender, Compression, Destination};
+use super::super::{Appender, Compression, Destination, Observer, Work};
 use super::*;
 
 fn open(bytes: &[u8]) -> Result<Log, LogError> {
@@ -247,4 +251,34 @@ fn a_chunk_indexed_twice_is_damage() {
     survey::complete(&file, &mut index, &mut damages).unwrap();
     assert!(damages.found[0].what.contains("indexed again"), "{damages:?}");
     assert_eq!(index.chunks, log_file.index().chunks);
+}
+
+#[test]
+fn the_observer_hears_of_a_scan_up_to_its_end() {
+    for options in [chunked().use_chunks(false), chunked()] {
+        let (_dir, path) = on_disk(&log(options.emit_summary_records(false).emit_summary_offsets(false)));
+        let told = Arc::new(Mutex::new(Vec::new()));
+        let ear = Arc::clone(&told);
+        let observer = Observer::new(move |progress| ear.lock().unwrap().push(progress));
+        let log = Log::open_with(path, ReadOptions { observer, ..ReadOptions::default() }).unwrap();
+        let told = told.lock().unwrap();
+        assert!(told.iter().all(|p| p.work == Work::Scan && p.done <= p.total), "{told:?}");
+        assert!(told.iter().any(|p| p.done < p.total), "{told:?}");
+        assert_eq!(told.iter().map(|p| p.done).max(), Some(log.index().data_end));
+    }
+}
+
+#[test]
+fn of_a_log_that_is_cut_off_the_cut_is_named_before_what_follows_from_it() {
+    let bytes = log(chunked());
+    let whole = open(&bytes).unwrap();
+    let chunk = &whole.index().chunks[2];
+    let within = (chunk.chunk_start_offset + chunk.chunk_length) as usize - 3;
+    for (len, says) in
+        [(whole.index().data_end as usize, "the log is cut off here"), (within, "the log is cut off: of")]
+    {
+        let log = open(&bytes[..len]).unwrap();
+        assert!(log.damage()[0].what.starts_with(says), "{:?}", log.damage());
+        assert!(log.damage().iter().all(|damage| !damage.what.contains("the magic")), "{:?}", log.damage());
+    }
 }

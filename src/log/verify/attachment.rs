@@ -4,6 +4,7 @@ use mcap::records::{AttachmentHeader, AttachmentIndex};
 
 use super::super::LogError;
 use super::super::file::{Head, parse};
+use super::super::index::attachment_index;
 use super::Checked;
 use super::findings::{Findings, quoted};
 use super::sequence::Sequence;
@@ -25,7 +26,7 @@ pub(super) fn read(
     let mut need = 8 + 8 + 4;
     for next in [4_u64, 8, 0] {
         let left = head.end() - sequence.position;
-        if need > left.min(LONGEST_TEXT) {
+        if need > left.min(LONGEST_TEXT).min(sequence.file.options.memory_limit) {
             let what = format_args!("the attachment's fields need {need} bytes, its record has {left} left");
             findings.wrong(head.offset, what);
             sequence.pass(left, |_| {})?;
@@ -68,13 +69,5 @@ pub(super) fn read(
             format_args!("the attachment{name} has the CRC {found:08x}, its record says {claimed:08x}"),
         );
     }
-    Ok(header.map(|header| AttachmentIndex {
-        offset: head.offset,
-        length: head.end() - head.offset,
-        log_time: header.log_time,
-        create_time: header.create_time,
-        data_size,
-        name: header.name,
-        media_type: header.media_type,
-    }))
+    Ok(header.map(|header| attachment_index(head, header, data_size)))
 }

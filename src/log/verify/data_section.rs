@@ -8,7 +8,6 @@ use mcap::records::{
 
 use super::super::LogError;
 use super::super::file::{Head, parse};
-use super::super::options::MEMORY_LIMIT;
 use super::chunk_content::OpenChunk;
 use super::content::{Content, Place};
 use super::findings::Findings;
@@ -179,7 +178,8 @@ impl DataSection {
         head: Head,
         body: &mut Vec<u8>,
     ) -> Result<bool, LogError> {
-        if head.body_len <= MEMORY_LIMIT {
+        let limit = sequence.file.options.memory_limit;
+        if head.body_len <= limit {
             sequence.read_into(head.body_len, body)?;
             return Ok(true);
         }
@@ -187,7 +187,7 @@ impl DataSection {
         self.findings.wrong(
             head.offset,
             format_args!(
-                "{} of {} bytes, more than the limit of {MEMORY_LIMIT}, was not looked into",
+                "{} of {} bytes, more than the limit of {limit}, was not looked into",
                 name_of(head.opcode),
                 head.body_len
             ),

@@ -33,7 +33,6 @@ use data_section::DataSection;
 use sequence::Sequence;
 
 pub use findings::Finding;
-pub use sequence::Progress;
 
 /// How much was checked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -88,15 +87,14 @@ impl Verification {
     }
 }
 
-/// Reads the whole file and says what is wrong with it. `progress` is told now and then how many bytes have been
-/// read, and of how many.
+/// Reads the whole file, as `options` say, and says what is wrong with it.
 ///
 /// # Errors
 /// [`LogError::Open`], [`LogError::Read`]; [`LogError::NotMcap`] where the file doesn't start like one.
 /// Everything else that is wrong is a [`Finding`].
-pub fn verify(path: &Path, progress: &mut Progress<'_>) -> Result<Verification, LogError> {
-    let file = LogFile::open(path, ReadOptions::default())?;
-    let mut sequence = Sequence::new(&file, progress);
+pub fn verify(path: &Path, options: ReadOptions) -> Result<Verification, LogError> {
+    let file = LogFile::open(path, options)?;
+    let mut sequence = Sequence::new(&file);
     let mut start = Vec::new();
     sequence.read_into(file.len.min(MAGIC.len() as u64), &mut start)?;
     if start.is_empty() || !MAGIC.starts_with(&start) {

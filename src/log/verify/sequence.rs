@@ -2,17 +2,13 @@
 
 use std::io::{BufReader, Read};
 
-use super::super::LogError;
 use super::super::file::{At, HEAD_LEN, Head, LogFile, split_head};
-use super::super::options::MEMORY_LIMIT;
+use super::super::{LogError, Work};
 
 /// How much is read at once.
 const PIECE: u64 = 1 << 20;
 /// How often progress is told.
 const TOLD_EVERY: u64 = 8 << 20;
-
-/// Is told how many bytes have been read, and of how many.
-pub type Progress<'a> = dyn FnMut(u64, u64) + 'a;
 
 /// A position that only moves on.
 pub(super) struct Sequence<'a> {
@@ -23,12 +19,11 @@ pub(super) struct Sequence<'a> {
     /// Where the last head stood, and the checksum before it.
     record: (u64, crc32fast::Hasher),
     told: u64,
-    progress: &'a mut Progress<'a>,
     piece: Vec<u8>,
 }
 
 impl<'a> Sequence<'a> {
-    pub(super) fn new(file: &'a LogFile, progress: &'a mut Progress<'a>) -> Self {
+    pub(super) fn new(file: &'a LogFile) -> Self {
         Self {
             file,
             reader: BufReader::with_capacity(PIECE as usize, file.reader(0)),
@@ -36,7 +31,6 @@ impl<'a> Sequence<'a> {
             crc: crc32fast::Hasher::new(),
             record: (0, crc32fast::Hasher::new()),
             told: 0,
-            progress,
             piece: Vec::new(),
         }
     }
@@ -83,7 +77,7 @@ impl<'a> Sequence<'a> {
     /// Puts the next `len` bytes into `buf`, in place of what it held.
     pub(super) fn read_into(&mut self, len: u64, buf: &mut Vec<u8>) -> Result<(), LogError> {
         let offset = self.position;
-        if len > MEMORY_LIMIT {
+        if len > self.file.options.memory_limit {
             return Err(self.file.too_large(offset, "a record", len));
         }
         buf.clear();
@@ -96,7 +90,7 @@ impl<'a> Sequence<'a> {
         self.position += len;
         if self.position >= self.told + TOLD_EVERY || self.left() == 0 {
             self.told = self.position;
-            (self.progress)(self.position, self.file.len);
+            self.file.options.observer.tell(Work::Read, self.position, self.file.len);
         }
         Ok(())
     }
@@ -105,7 +99,7 @@ impl<'a> Sequence<'a> {
     pub(super) fn pass(&mut self, mut len: u64, mut f: impl FnMut(&[u8])) -> Result<(), LogError> {
         let mut piece = std::mem::take(&mut self.piece);
         while len > 0 {
-            let next = len.min(PIECE);
+            let next = len.min(PIECE).min(self.file.options.memory_limit.max(1));
             self.read_into(next, &mut piece)?;
             f(&piece);
             len -= next;

@@ -7,7 +7,6 @@ use mcap::records::{AttachmentIndex, ChunkIndex, Footer, MetadataIndex, op};
 use super::super::LogError;
 use super::super::ending::MAGIC;
 use super::super::file::{HEAD_LEN, Head, LogFile, parse};
-use super::super::options::MEMORY_LIMIT;
 use super::against::Summary;
 use super::data_section::{DataSection, End};
 use super::sequence::{Sequence, name_of};
@@ -167,7 +166,7 @@ pub(super) fn check(
             let what = format_args!("{} in the summary, where it doesn't belong", name_of(head.opcode));
             data.findings.wrong(offset, what);
         }
-        if head.body_len > MEMORY_LIMIT {
+        if head.body_len > sequence.file.options.memory_limit {
             summary.has_holes = true;
             data.findings.wrong(offset, "a record of the summary larger than the limit was not looked into");
             sequence.pass(head.body_len, |_| {})?;

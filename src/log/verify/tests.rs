@@ -1,7 +1,9 @@
 //! A good log is broken in one place each, and verifying must say so there.
 
 use std::fs;
+use std::sync::{Arc, Mutex};
 
+use super::super::Observer;
 use super::super::fixture::{PRIVATE, chunked, log, on_disk, records};
 use super::super::summary::encode_bytes;
 use super::*;
@@ -9,7 +11,7 @@ use mcap::records::op;
 
 fn of(bytes: &[u8]) -> Verification {
     let (_dir, path) = on_disk(bytes);
-    verify(&path, &mut |_, _| {}).unwrap()
+    verify(&path, ReadOptions::default()).unwrap()
 }
 
 /// A log without the checksums that would tell of every change.
@@ -79,7 +81,7 @@ fn every_flipped_byte_is_found() {
         let mut bytes = bytes.clone();
         bytes[at] ^= 1 << (at % 8);
         fs::write(&path, &bytes).unwrap();
-        assert!(!verify(&path, &mut |_, _| {}).unwrap().is_clean(), "byte {at}");
+        assert!(!verify(&path, ReadOptions::default()).unwrap().is_clean(), "byte {at}");
     }
 }
 
@@ -89,7 +91,7 @@ fn a_log_cut_off_anywhere_and_bytes_behind_its_end_are_found() {
     let (_dir, path) = on_disk(&bytes);
     for len in 1..bytes.len() {
         fs::write(&path, &bytes[..len]).unwrap();
-        assert!(!verify(&path, &mut |_, _| {}).unwrap().is_clean(), "cut at {len}");
+        assert!(!verify(&path, ReadOptions::default()).unwrap().is_clean(), "cut at {len}");
     }
     assert_says(&[&bytes[..], b"more"].concat(), bytes.len(), "4 bytes stand behind the end");
     let footer = body_of(&bytes, op::FOOTER) - 9;
@@ -302,9 +304,11 @@ fn a_file_that_is_broken_all_over_is_told_of_in_bounded_memory() {
 fn progress_is_told_up_to_the_last_byte() {
     let bytes = log(chunked());
     let (_dir, path) = on_disk(&bytes);
-    let mut told = Vec::new();
-    let found = verify(&path, &mut |read, of| told.push((read, of))).unwrap();
+    let told = Arc::new(Mutex::new(Vec::new()));
+    let ear = Arc::clone(&told);
+    let observer = Observer::new(move |progress| ear.lock().unwrap().push((progress.done, progress.total)));
+    let found = verify(&path, ReadOptions { observer, ..ReadOptions::default() }).unwrap();
     let len = bytes.len() as u64;
-    assert_eq!(told.last(), Some(&(len, len)));
+    assert_eq!(told.lock().unwrap().last(), Some(&(len, len)));
     assert_eq!(found.checked.bytes, len);
 }

@@ -4,13 +4,13 @@
 //! the characteristic points as spheres with their names, and 95 % ellipsoids around them and around the track's
 //! last point. Viewers keep vertices as 32-bit floats, so lines count from a point nearby.
 
-mod lines;
 mod primitives;
 
-use lines::{Polyline, polylines};
-use primitives::{Color, Entity, KeyValue, Label, Line, SceneUpdate, Sphere};
+pub(super) use primitives::{Color, SceneUpdate};
+use primitives::{Entity, KeyValue, Label, Line, Sphere};
 
-use super::fields::{Pose, Stamp, Xyz, drawn_in, json, milli};
+use super::fields::{Pose, Stamp, Xyz, drawn_in, milli};
+use super::lines::{Polyline, breaks, polylines, track_lines};
 use super::{Context, Published, Topic};
 use crate::fusion::Fusion;
 use crate::quality::BAND_SIGMAS;
@@ -19,10 +19,10 @@ use crate::time::Time;
 use crate::track::{Phase, State};
 
 /// Most vertices of the track, and of all sources together. With what follows they stay below 20,000.
-const TRACK_VERTICES: usize = 10_000;
+pub(super) const TRACK_VERTICES: usize = 10_000;
 const SOURCE_VERTICES: usize = 9_000;
 /// Most characteristic points: the first ones.
-const MARKS: usize = 250;
+pub(super) const MARKS: usize = 250;
 
 const TRACK_PX: f64 = 3.0;
 const SOURCE_PX: f64 = 1.0;
@@ -32,7 +32,7 @@ const LABEL_PX: f64 = 14.0;
 const MARK_SHARE: f64 = 0.008;
 
 /// Colours that people tell apart whatever their sight (Okabe & Ito 2008), on dark and on light ground.
-fn phase_color(phase: Phase) -> ([u8; 3], &'static str) {
+pub(crate) fn phase_color(phase: Phase) -> ([u8; 3], &'static str) {
     match phase {
         Phase::Single => ([86, 180, 233], "sky blue"),
         Phase::Overlap => ([0, 158, 115], "green"),
@@ -52,10 +52,9 @@ const WHITE: [u8; 3] = [255, 255, 255];
 /// The message, at `time`.
 pub(super) fn scene_message(fusion: &Fusion, context: &Context<'_>, time: Time) -> Published {
     let drawing = Drawing::new(fusion, context, time);
-    let mut entities: Vec<Entity<'_>> = (0..context.sources.len()).map(|i| drawing.source(i)).collect();
+    let mut entities: Vec<Entity> = (0..context.sources.len()).map(|i| drawing.source(i)).collect();
     entities.extend([drawing.track(), drawing.marks(), drawing.uncertainty()]);
-    let data = json(&SceneUpdate { deletions: [], entities });
-    Published { topic: Topic::Scene, time, data }
+    context.publish(Topic::Scene, time, SceneUpdate { entities, ..SceneUpdate::default() })
 }
 
 struct Drawing<'a> {
@@ -82,13 +81,13 @@ impl<'a> Drawing<'a> {
             fusion,
             context,
             frame_id: drawn_in(&fusion.track.frame_id),
-            stamp: time.into(),
+            stamp: Stamp::of(time),
             anchor: near.map(f64::round),
             diagonal_m: sides.iter().map(|s| s * s).sum::<f64>().sqrt(),
         }
     }
 
-    fn entity(&self, id: impl Into<String>) -> Entity<'a> {
+    fn entity(&self, id: impl Into<String>) -> Entity {
         Entity::new(id, self.frame_id, self.stamp)
     }
 
@@ -99,24 +98,8 @@ impl<'a> Drawing<'a> {
         Some(Line::strip(self.anchor.into(), points, thickness_px, color))
     }
 
-    /// The piece that `time_s` is in.
-    fn piece_of(&self, time_s: f64) -> usize {
-        self.fusion.pieces.partition_point(|&(from_s, _)| from_s <= time_s)
-    }
-
-    /// The indices of those of `times` that are more than `max_step_s` after the one before, or in another piece.
-    fn breaks(&self, times_s: impl Iterator<Item = f64> + Clone, max_step_s: f64) -> Vec<usize> {
-        let pairs = times_s.clone().zip(times_s.skip(1)).enumerate();
-        let cut = |a: f64, b: f64| b - a > max_step_s || self.piece_of(a) != self.piece_of(b);
-        pairs.filter(|&(_, (a, b))| cut(a, b)).map(|(i, _)| i + 1).collect()
-    }
-
-    fn track(&self) -> Entity<'a> {
-        let points = &self.fusion.track.points;
-        let times_s = points.iter().map(|p| p.time.seconds_since(self.context.origin));
-        let breaks = self.breaks(times_s, 1.5 / self.context.rate_hz);
-        let point = |i: usize| (points[i].state.position, points[i].phase);
-        let lines = polylines(points.len(), &breaks, point, TRACK_VERTICES);
+    fn track(&self) -> Entity {
+        let lines = track_lines(self.fusion, self.context, TRACK_VERTICES);
         let mut entity = self.entity("track");
         entity.lines = lines
             .iter()
@@ -128,10 +111,10 @@ impl<'a> Drawing<'a> {
         entity
     }
 
-    fn source(&self, index: usize) -> Entity<'a> {
+    fn source(&self, index: usize) -> Entity {
         let Source { name, positions, .. } = &self.context.sources[index];
         let outage_s = self.fusion.coverage.outage_s(index, Quantity::Position);
-        let breaks = self.breaks(positions.iter().map(|p| p.time_s), outage_s);
+        let breaks = breaks(self.fusion, positions.iter().map(|p| p.time_s), outage_s);
         let budget = SOURCE_VERTICES / self.context.sources.len();
         let lines = polylines(positions.len(), &breaks, |i| (positions[i].value, ()), budget);
         let color = Color::rgb(source_color(index));
@@ -142,7 +125,7 @@ impl<'a> Drawing<'a> {
         entity
     }
 
-    fn marks(&self) -> Entity<'a> {
+    fn marks(&self) -> Entity {
         let mut entity = self.entity("characteristic points");
         let diameter_m = (MARK_SHARE * self.diagonal_m).max(0.05);
         for event in self.fusion.events.iter().take(MARKS) {
@@ -151,15 +134,15 @@ impl<'a> Drawing<'a> {
                 continue;
             };
             let color = Color::rgb(WHITE);
-            let size = [diameter_m; 3].into();
-            entity.spheres.push(Sphere { pose: Pose::at(at), size, color });
+            let size = Some([diameter_m; 3].into());
+            entity.spheres.push(Sphere { pose: Some(Pose::at(at)), size, color: Some(color) });
             entity.texts.push(Label::facing(above, &event.name, LABEL_PX, color));
         }
         entity
     }
 
     /// Apart from the marks: a viewer draws all spheres of an entity see-through where one is.
-    fn uncertainty(&self) -> Entity<'a> {
+    fn uncertainty(&self) -> Entity {
         let mut entity = self.entity("95 % uncertainty");
         let events = self.fusion.events.iter().take(MARKS).map(|e| (&e.state, e.phase));
         let end = self.fusion.track.points.last().map(|p| (&p.state, p.phase));
@@ -172,5 +155,5 @@ impl<'a> Drawing<'a> {
 fn ellipsoid(state: &State, phase: Phase) -> Option<Sphere> {
     let size = milli(state.position_sigma.map(|s| 2.0 * BAND_SIGMAS * s))?;
     let color = Color::rgb(phase_color(phase).0).with_alpha(0.2);
-    Some(Sphere { pose: Pose::at(milli(state.position)?), size, color })
+    Some(Sphere { pose: Some(Pose::at(milli(state.position)?)), size: Some(size), color: Some(color) })
 }

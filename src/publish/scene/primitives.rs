@@ -3,76 +3,98 @@
 use serde::Serialize;
 
 use super::super::fields::{Pose, Stamp, Xyz};
+use super::super::payload::Payload;
+use super::super::ros;
 
-#[derive(Serialize)]
-pub(super) struct SceneUpdate<'a> {
+#[derive(Serialize, prost::Message)]
+pub(in crate::publish) struct SceneUpdate {
+    #[prost(message, repeated, tag = "1")]
     pub(super) deletions: Nothing,
-    pub(super) entities: Vec<Entity<'a>>,
+    #[prost(message, repeated, tag = "2")]
+    pub(in crate::publish) entities: Vec<Entity>,
 }
 
-/// An empty list. A viewer wants all lists to be there.
-pub(super) type Nothing = [(); 0];
+impl Payload for SceneUpdate {
+    type Ros = ros::MarkerArray;
+}
+
+/// A list that stays empty. A viewer wants all lists to be there.
+type Nothing = Vec<()>;
 
 /// No end.
-#[derive(Serialize)]
-pub(super) struct Lifetime {
-    sec: i32,
-    nsec: u32,
+#[derive(Serialize, prost::Message)]
+struct Lifetime {
+    #[prost(int64, tag = "1")]
+    sec: i64,
+    #[prost(int32, tag = "2")]
+    nsec: i32,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, prost::Message)]
 pub(super) struct KeyValue {
+    #[prost(string, tag = "1")]
     pub(super) key: String,
+    #[prost(string, tag = "2")]
     pub(super) value: String,
 }
 
-#[derive(Serialize)]
-pub(super) struct Entity<'a> {
-    timestamp: Stamp,
-    frame_id: &'a str,
-    id: String,
-    lifetime: Lifetime,
+#[derive(Serialize, prost::Message)]
+pub(in crate::publish) struct Entity {
+    #[prost(message, optional, tag = "1")]
+    pub(in crate::publish) timestamp: Option<Stamp>,
+    #[prost(string, tag = "2")]
+    pub(in crate::publish) frame_id: String,
+    #[prost(string, tag = "3")]
+    pub(in crate::publish) id: String,
+    #[prost(message, optional, tag = "4")]
+    lifetime: Option<Lifetime>,
+    #[prost(bool, tag = "5")]
     frame_locked: bool,
     /// What a viewer shows of an entity that is clicked.
+    #[prost(message, repeated, tag = "6")]
     pub(super) metadata: Vec<KeyValue>,
+    #[prost(message, repeated, tag = "7")]
     arrows: Nothing,
+    #[prost(message, repeated, tag = "8")]
     cubes: Nothing,
-    pub(super) spheres: Vec<Sphere>,
+    #[prost(message, repeated, tag = "9")]
+    pub(in crate::publish) spheres: Vec<Sphere>,
+    #[prost(message, repeated, tag = "10")]
     cylinders: Nothing,
-    pub(super) lines: Vec<Line>,
+    #[prost(message, repeated, tag = "11")]
+    pub(in crate::publish) lines: Vec<Line>,
+    #[prost(message, repeated, tag = "12")]
     triangles: Nothing,
-    pub(super) texts: Vec<Label>,
+    #[prost(message, repeated, tag = "13")]
+    pub(in crate::publish) texts: Vec<Label>,
+    #[prost(message, repeated, tag = "14")]
     models: Nothing,
 }
 
-impl<'a> Entity<'a> {
+impl Entity {
     /// An entity that stays, with nothing in it.
-    pub(super) fn new(id: impl Into<String>, frame_id: &'a str, timestamp: Stamp) -> Self {
+    pub(super) fn new(id: impl Into<String>, frame_id: &str, timestamp: Stamp) -> Self {
         Self {
-            timestamp,
-            frame_id,
+            timestamp: Some(timestamp),
+            frame_id: frame_id.to_owned(),
             id: id.into(),
-            lifetime: Lifetime { sec: 0, nsec: 0 },
+            lifetime: Some(Lifetime::default()),
             frame_locked: true,
-            metadata: Vec::new(),
-            arrows: [],
-            cubes: [],
-            spheres: Vec::new(),
-            cylinders: [],
-            lines: Vec::new(),
-            triangles: [],
-            texts: Vec::new(),
-            models: [],
+            ..Self::default()
         }
     }
 }
 
-#[derive(Clone, Copy, Serialize)]
-pub(super) struct Color {
-    r: f64,
-    g: f64,
-    b: f64,
-    a: f64,
+#[derive(Clone, Copy, PartialEq, prost::Message, Serialize)]
+pub(in crate::publish) struct Color {
+    #[prost(double, tag = "1")]
+    pub(in crate::publish) r: f64,
+    #[prost(double, tag = "2")]
+    pub(in crate::publish) g: f64,
+    #[prost(double, tag = "3")]
+    pub(in crate::publish) b: f64,
+    #[prost(double, tag = "4")]
+    pub(in crate::publish) a: f64,
 }
 
 impl Color {
@@ -87,66 +109,82 @@ impl Color {
     }
 }
 
-#[derive(Serialize)]
-pub(super) struct Sphere {
-    pub(super) pose: Pose,
+#[derive(Serialize, prost::Message)]
+pub(in crate::publish) struct Sphere {
+    #[prost(message, optional, tag = "1")]
+    pub(in crate::publish) pose: Option<Pose>,
     /// Diameters, m.
-    pub(super) size: Xyz,
-    pub(super) color: Color,
+    #[prost(message, optional, tag = "2")]
+    pub(in crate::publish) size: Option<Xyz>,
+    #[prost(message, optional, tag = "3")]
+    pub(in crate::publish) color: Option<Color>,
 }
 
-#[derive(Serialize)]
-pub(super) struct Line {
+#[derive(Serialize, prost::Message)]
+pub(in crate::publish) struct Line {
     #[serde(rename = "type")]
-    kind: u8,
-    pose: Pose,
-    thickness: f64,
+    #[prost(int32, tag = "1")]
+    kind: i32,
+    #[prost(message, optional, tag = "2")]
+    pub(in crate::publish) pose: Option<Pose>,
+    #[prost(double, tag = "3")]
+    pub(in crate::publish) thickness: f64,
+    #[prost(bool, tag = "4")]
     scale_invariant: bool,
-    points: Vec<Xyz>,
-    color: Color,
+    #[prost(message, repeated, tag = "5")]
+    pub(in crate::publish) points: Vec<Xyz>,
+    #[prost(message, optional, tag = "6")]
+    pub(in crate::publish) color: Option<Color>,
+    #[prost(message, repeated, tag = "7")]
     colors: Nothing,
-    indices: Nothing,
+    #[prost(fixed32, repeated, tag = "8")]
+    indices: Vec<u32>,
 }
 
 /// `foxglove.LineType`: each point is joined to the next.
-const LINE_STRIP: u8 = 0;
+const LINE_STRIP: i32 = 0;
 
 impl Line {
     /// A line through `points`, which count from `anchor`.
     pub(super) fn strip(anchor: Xyz, points: Vec<Xyz>, thickness_px: f64, color: Color) -> Self {
         Self {
             kind: LINE_STRIP,
-            pose: Pose::at(anchor),
+            pose: Some(Pose::at(anchor)),
             thickness: thickness_px,
             scale_invariant: true,
             points,
-            color,
-            colors: [],
-            indices: [],
+            color: Some(color),
+            ..Self::default()
         }
     }
 }
 
 /// A `foxglove.TextPrimitive`.
-#[derive(Serialize)]
-pub(super) struct Label {
-    pose: Pose,
+#[derive(Serialize, prost::Message)]
+pub(in crate::publish) struct Label {
+    #[prost(message, optional, tag = "1")]
+    pub(in crate::publish) pose: Option<Pose>,
+    #[prost(bool, tag = "2")]
     billboard: bool,
-    font_size: f64,
+    #[prost(double, tag = "3")]
+    pub(in crate::publish) font_size: f64,
+    #[prost(bool, tag = "4")]
     scale_invariant: bool,
-    color: Color,
-    text: String,
+    #[prost(message, optional, tag = "5")]
+    pub(in crate::publish) color: Option<Color>,
+    #[prost(string, tag = "6")]
+    pub(in crate::publish) text: String,
 }
 
 impl Label {
     /// A text that faces the viewer, whatever it looks from.
     pub(super) fn facing(at: Xyz, text: &str, font_size_px: f64, color: Color) -> Self {
         Self {
-            pose: Pose::at(at),
+            pose: Some(Pose::at(at)),
             billboard: true,
             font_size: font_size_px,
             scale_invariant: true,
-            color,
+            color: Some(color),
             text: text.to_owned(),
         }
     }

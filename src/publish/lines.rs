@@ -1,11 +1,34 @@
 //! Polylines through points of different kinds: cut where nothing was seen, thinned, one for each kind.
 
+use super::Context;
+use crate::fusion::Fusion;
 use crate::math::polyline::{Rank, Vertex, thin};
+use crate::track::Phase;
 
 /// A polyline of one kind, at least two points.
 pub(super) struct Polyline<K> {
     pub(super) kind: K,
     pub(super) points: Vec<[f64; 3]>,
+}
+
+/// The track, a line for each stretch of one phase, of at most `budget` vertices together.
+pub(super) fn track_lines(fusion: &Fusion, context: &Context<'_>, budget: usize) -> Vec<Polyline<Phase>> {
+    let points = &fusion.track.points;
+    let times_s = points.iter().map(|p| p.time.seconds_since(context.origin));
+    let breaks = breaks(fusion, times_s, 1.5 / context.rate_hz);
+    polylines(points.len(), &breaks, |i| (points[i].state.position, points[i].phase), budget)
+}
+
+/// The indices of those of `times_s` that are more than `max_step_s` after the one before, or in another piece.
+pub(super) fn breaks(
+    fusion: &Fusion,
+    times_s: impl Iterator<Item = f64> + Clone,
+    max_step_s: f64,
+) -> Vec<usize> {
+    let piece_of = |time_s: f64| fusion.pieces.partition_point(|&(from_s, _)| from_s <= time_s);
+    let pairs = times_s.clone().zip(times_s.skip(1)).enumerate();
+    let cut = |a: f64, b: f64| b - a > max_step_s || piece_of(a) != piece_of(b);
+    pairs.filter(|&(_, (a, b))| cut(a, b)).map(|(i, _)| i + 1).collect()
 }
 
 /// Polylines through `count` points, none across the `breaks`, of at most `budget` vertices together.

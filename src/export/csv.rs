@@ -1,9 +1,10 @@
-//! A track as a table: one line a point, empty where there is no value.
+//! Comma-separated values: one line a point, empty where there is no value.
 
 use std::io::{self, Write};
 
 use crate::source::Recorded;
 use crate::time::Time;
+use crate::track::TrackPoint;
 
 /// The columns' names, each with its unit.
 pub const COLUMNS: [&str; 19] = [
@@ -43,19 +44,21 @@ pub fn write_csv(recorded: &Recorded, t0: Time, out: &mut impl Write) -> io::Res
 /// The table's rows as text, in the order of [`COLUMNS`].
 pub fn rows(recorded: &Recorded, t0: Time) -> impl Iterator<Item = Vec<String>> + '_ {
     recorded.track.points.iter().map(move |point| {
-        let s = &point.state;
         let ns = i128::from(point.time.ns()) - i128::from(t0.ns());
         let mut row = vec![point.time.ns().to_string(), seconds(ns)];
-        let unknown = [f64::NAN; 3];
-        let vectors =
-            [s.position, s.velocity, s.acceleration.unwrap_or(unknown), s.position_sigma, s.velocity_sigma];
-        row.extend(
-            vectors.iter().flatten().map(|v| if v.is_finite() { v.to_string() } else { String::new() }),
-        );
+        row.extend(numbers(point).iter().map(|v| if v.is_finite() { v.to_string() } else { String::new() }));
         let labels = [point.phase.name(), point.method.name()];
         row.extend(labels.map(|l| if recorded.has_phases { l.to_owned() } else { String::new() }));
         row
     })
+}
+
+/// The values of the columns from `x_m` to `vz_sigma_m_s`; not finite where there is none.
+pub(super) fn numbers(point: &TrackPoint) -> [f64; 15] {
+    let s = &point.state;
+    let acceleration = s.acceleration.unwrap_or([f64::NAN; 3]);
+    let vectors = [s.position, s.velocity, acceleration, s.position_sigma, s.velocity_sigma];
+    std::array::from_fn(|i| vectors[i / 3][i % 3])
 }
 
 /// Nanoseconds as seconds, exactly.
