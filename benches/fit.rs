@@ -1,6 +1,6 @@
 //! Cost of SFF a sample, positions and velocities on three axes: the fit with its penalty's weight found and
 //! its posterior covariance, and the evaluation of states with their sigmas. Neither should depend on the
-//! number of samples. Registration of two sources likewise.
+//! number of samples. Registration of two sources and cleaning of USBL fixes likewise.
 
 use criterion::{
     BatchSize, BenchmarkId, Criterion, SamplingMode, Throughput, criterion_group, criterion_main,
@@ -10,6 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use trackfuse::estimate::registration;
 use trackfuse::estimate::spline::{self, Settings};
+use trackfuse::estimate::usbl;
 use trackfuse::sample::{Sample, Source};
 use trackfuse::track::Curve;
 
@@ -78,5 +79,29 @@ fn register(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, sff, register);
+/// Cleaning of a dive, a fifth of its fixes wild: cost a fix, from one dive to 70 days.
+fn clean_usbl(c: &mut Criterion) {
+    let mut group = c.benchmark_group("usbl");
+    group.sample_size(10).sampling_mode(SamplingMode::Flat);
+    for count in [1_000, 10_000, 100_000, 1_000_000] {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let fix = |i: usize| {
+            let time_s = 20.0 * (i / 4) as f64 + 0.5 * (i % 4) as f64;
+            let off = if (i / 4).is_multiple_of(10) || i.is_multiple_of(11) { 60.0 } else { 0.0 };
+            let value = std::array::from_fn(|axis| {
+                let noise: f64 = StandardNormal.sample(&mut rng);
+                300.0 * (time_s / 500.0 + axis as f64).sin() + 3.0 * noise + off
+            });
+            Sample { time_s, value, sigma: [3.0; 3] }
+        };
+        let fixes: Vec<Sample> = (0..count).map(fix).collect();
+        group.throughput(Throughput::Elements(count as u64));
+        group.bench_function(BenchmarkId::new("clean", count), |b| {
+            b.iter(|| usbl::clean(&fixes, &[], &usbl::Settings::default()).expect("a good problem"));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, sff, register, clean_usbl);
 criterion_main!(benches);

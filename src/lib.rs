@@ -16,9 +16,11 @@
 //! | registration of the sources to a datum | [`estimate::registration`] | ours |
 //! | extrapolation, its band from rolling origins | [`estimate::extrapolation`] | Zhang 2025, sea trial; the band is ours |
 //! | characteristic points | [`estimate::characteristic_point`] | Zhang 2025, eq. 13 |
+//! | USBL fixes cleaned, smoothed, predicted | [`estimate::usbl`] | Liu 2023; the smoother is ours |
 //! | lines of a picture, thinned | [`math::polyline`] | Visvalingam & Whyatt 1993 |
 //!
-//! Zhang 2025 is Zhang Xu, sectional track fusion by functional reconstruction, doi 10.19693/j.issn.1673-3185.04263.
+//! Zhang 2025 is Zhang Xu, sectional track fusion by functional reconstruction, doi 10.19693/j.issn.1673-3185.04263. Liu 2023
+//! is Liu et al., Ship Science and Technology 45(16).
 //!
 //! Who may know whom: [`commands`] everything; [`log`], [`estimate`], [`report`] the shared nouns ([`sample`],
 //! [`track`], [`time`]); [`estimate`] also [`math`]; [`math`] nothing of ours. [`fusion`] is the order of the

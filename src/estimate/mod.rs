@@ -9,6 +9,7 @@ pub mod noise;
 pub mod polynomial;
 pub mod registration;
 pub mod spline;
+pub mod usbl;
 pub mod weighted_mean;
 
 use schemars::JsonSchema;

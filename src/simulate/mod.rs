@@ -13,6 +13,7 @@ mod band_noise;
 mod bystanders;
 mod climb;
 mod climb_scenario;
+mod dive;
 mod error;
 mod families;
 mod log;
@@ -29,6 +30,7 @@ use rand_chacha::ChaCha8Rng;
 
 pub use climb::{ClimbConstants, Start, climb};
 pub use climb_scenario::{ClimbScenario, Profile};
+pub use dive::{DiveConstants, SimulatedFix, UsblConstants, UsblRecord, dive, watch_by_usbl};
 pub use error::SimulateError;
 pub use families::FAMILIES;
 pub use log::{write_log, write_simulation};

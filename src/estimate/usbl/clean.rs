@@ -1,0 +1,268 @@
+//! The robust smoother, from fixes to a track, a verdict for each, and warnings.
+
+use super::candidates::{Candidate, Exchange, WildShares, exchanges};
+use super::dive::Dive;
+use super::judging::Judging;
+use super::search::{Motion, search};
+use super::switches::Switches;
+use super::verdict::{Judged, Warning};
+use super::warnings::warnings;
+use super::wiener::{Knowledge, Wiener};
+use super::{Height, cycles, liveliness};
+use crate::estimate::{EstimateError, check};
+use crate::sample::{Sample, Source};
+use crate::track::{Curve, State};
+
+/// What may be chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// The vehicle is rarely faster, m/s. 2.5: twice what a deep submersible does; towed or torpedo-like ones need more.
+    pub speed_limit_m_s: f64,
+    /// Gap that parts two acoustic exchanges, s; by default [`cycles::exchange_gap_s`].
+    pub exchange_gap_s: Option<f64>,
+    /// How far a fix's height may be from the depth sensor's, sigmas. 4.5: one good fix in 150,000 is thrown out.
+    pub depth_gate_sigmas: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { speed_limit_m_s: 2.5, exchange_gap_s: None, depth_gate_sigmas: 4.5 }
+    }
+}
+
+/// Fewest fixes, and fewest exchanges that may carry a track.
+const MIN_FIXES: usize = 4;
+const MIN_CYCLES: usize = 3;
+
+/// Shares of wild fixes and exchanges before anything is known, and how many fixes or exchanges that knowledge is worth.
+const PRIOR_WILD: WildShares = WildShares { fix: 0.1, cycle: 0.1 };
+const PRIOR_WORTH: f64 = 20.0;
+
+/// The lowest and highest density of the acceleration that are looked at, over the square of the speed limit, as powers
+/// of ten: 1/s; and how many.
+const DENSITIES: (f64, f64, usize) = (-5.0, -2.0, 5);
+
+/// So many exchanges tell the density well enough for the first search.
+const ENOUGH: usize = 120;
+
+/// Most rounds in which switches are looked at anew.
+const ROUNDS: usize = 4;
+
+/// Steps to the density of the acceleration, from a first guess.
+const FIRST_STEPS: usize = 4;
+
+/// Steps with a liveliness that changes in time.
+const LIVELY_STEPS: usize = 5;
+
+/// Those of them after which whole exchanges are looked at once more.
+const LIVELY_REVISED: std::ops::Range<usize> = 1..3;
+
+/// A dive, cleaned.
+#[derive(Clone, Debug)]
+pub struct Cleaned {
+    track: Wiener,
+    /// A verdict for every fix that was given, in the order in which they were given.
+    pub judged: Vec<Judged>,
+    /// The mean times of the exchanges, s.
+    pub cycle_times_s: Vec<f64>,
+    /// Which of them were thrown out as a whole.
+    pub wild_cycles: Vec<bool>,
+    /// Standard deviation of the noise over what was stated: horizontal, vertical.
+    pub noise_scale: [f64; 2],
+    /// Density of the acceleration over the whole dive, m^2/s^3: horizontal, vertical.
+    pub acceleration_density: [f64; 2],
+    /// What a person must know.
+    pub warnings: Vec<Warning>,
+}
+
+impl Curve for Cleaned {
+    /// The state at any finite time; before the first and after the last exchange the vehicle goes straight on.
+    fn at(&self, time_s: f64) -> Option<State> {
+        time_s.is_finite().then(|| self.track.at(time_s))
+    }
+}
+
+/// Cleans a dive: a track, and a verdict for every fix.
+///
+/// `fixes` and `heights` may come in any order of time.
+///
+/// # Errors
+/// [`EstimateError::BadNumber`] for a value that is not finite or a sigma that is not positive,
+/// [`EstimateError::TooFewSamples`] below four fixes in three exchanges, [`EstimateError::Undetermined`] where too few
+/// fixes agree with each other.
+pub fn clean(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Result<Cleaned, EstimateError> {
+    checked(fixes, heights)?;
+    let mut judging = Judging::new(fixes, heights, settings);
+    let usable: Vec<Sample> = judging.usable.iter().map(|&i| fixes[i]).collect();
+    let times: Vec<f64> = usable.iter().map(|f| f.time_s).collect();
+    let gap_s =
+        settings.exchange_gap_s.unwrap_or_else(|| cycles::exchange_gap_s(&times)).max(cycles::LEAST_GAP_S);
+    let groups = cycles::group(&times, gap_s);
+    for (needed, got) in [(MIN_FIXES, usable.len()), (MIN_CYCLES, groups.len())] {
+        if got < needed {
+            return Err(EstimateError::TooFewSamples { what: "usbl".into(), needed, got });
+        }
+    }
+    let mut first_scale = cycles::first_noise_scale(&usable, &groups);
+    let scaled = |scale: [f64; 2]| -> Vec<Sample> {
+        let by_axis = [scale[0], scale[0], scale[1]];
+        let of = |f: &Sample| Sample { sigma: std::array::from_fn(|a| f.sigma[a] * by_axis[a]), ..*f };
+        usable.iter().map(of).collect()
+    };
+
+    // a first search with a density that suits the dive
+    let within_m_s = 0.3 * settings.speed_limit_m_s;
+    let (mut found, mut candidates) = exchanges(&scaled([first_scale; 2]), &groups, PRIOR_WILD, within_m_s);
+    let motion = |density: [f64; 2]| Motion {
+        density: [density[0], density[0], density[1]],
+        speed_limit_m_s: settings.speed_limit_m_s,
+    };
+    let (low, high, count) = DENSITIES;
+    let likeliest = |found: &[Exchange], candidates: &[Candidate]| {
+        let enough = &found[..found.len().min(ENOUGH)];
+        let tried = (0..count).map(|i| {
+            let exponent = low + (high - low) * i as f64 / (count - 1) as f64;
+            let density = settings.speed_limit_m_s.powi(2) * 10.0_f64.powf(exponent);
+            (density, search(enough, candidates, PRIOR_WILD, motion([density; 2])).log_likelihood)
+        });
+        tried.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((settings.speed_limit_m_s.powi(2), 0.0))
+    };
+    let (mut density, likelihood) = likeliest(&found, &candidates);
+    if first_scale != 1.0 {
+        // many wild fixes look like much noise: whichever explains more
+        let other = exchanges(&scaled([1.0; 2]), &groups, PRIOR_WILD, within_m_s);
+        let as_stated = likeliest(&other.0, &other.1);
+        if as_stated.1 > likelihood {
+            (found, candidates, density, first_scale) = (other.0, other.1, as_stated.0, 1.0);
+        }
+    }
+    let first = search(&found, &candidates, PRIOR_WILD, motion([density; 2]));
+
+    // what it says of noise, motion and wild shares, then a second one that knows
+    let dive = Dive::new(scaled([first_scale; 2]), found, candidates, heights);
+    let mut switches = Switches::new(&dive, &first.chosen, PRIOR_WILD);
+    let mut fit = Fit { scale: [1.0; 2], density: [density; 2], speed_m_s: 0.5 * settings.speed_limit_m_s };
+    fit.settle(&dive, &switches, FIRST_STEPS)?;
+    let wild = switches.shares(PRIOR_WILD, PRIOR_WORTH);
+    let scale = fit.scale.map(|s| s * first_scale);
+    let scaled_fixes = scaled(scale);
+    let (found, candidates) = exchanges(&scaled_fixes, &groups, wild, within_m_s);
+    let second = search(&found, &candidates, wild, motion(fit.density));
+    let dive = Dive::new(scaled_fixes, found, candidates, heights);
+    switches = Switches::new(&dive, &second.chosen, wild);
+    fit.scale = [1.0; 2];
+
+    // every switch against the track without its exchange
+    let mut track = fit.settle(&dive, &switches, FIRST_STEPS / 2)?;
+    for _ in 0..ROUNDS {
+        if !switches.revise(&dive, &track, fit.scale) {
+            break;
+        }
+        track = fit.settle(&dive, &switches, 1)?;
+    }
+    // a liveliness that changes in time, and fixes one by one
+    for step in 0..LIVELY_STEPS {
+        let densities = liveliness::densities(&track, &dive.nodes_s, &switches.heard(&dive), fit.density);
+        track = fit.track(&dive, &switches, densities)?;
+        if LIVELY_REVISED.contains(&step) {
+            switches.revise(&dive, &track, fit.scale);
+        } else {
+            switches.revise_fixes(&dive, &track, fit.scale);
+        }
+        fit.noise(&dive, &switches, &track);
+    }
+    let scale = [scale[0] * fit.scale[0], scale[1] * fit.scale[1]];
+    judging.judge(&dive, &switches, &track, fit.scale);
+    let warnings = warnings(&dive, &switches, &track, &second.disputes, scale);
+    Ok(Cleaned {
+        track,
+        judged: judging.judged,
+        cycle_times_s: dive.exchanges.iter().map(|e| e.time_s).collect(),
+        wild_cycles: switches.believed.iter().map(|b| !b).collect(),
+        noise_scale: scale,
+        acceleration_density: fit.density,
+        warnings,
+    })
+}
+
+fn checked(fixes: &[Sample], heights: &[Height]) -> Result<(), EstimateError> {
+    let depths = |h: &Height| Sample { time_s: h.time_s, value: [0.0, 0.0, h.z_m], sigma: [h.sigma_m; 3] };
+    let source = |name: &str, positions| Source { name: name.into(), positions, velocities: Vec::new() };
+    check(&[source("the fixes", fixes.to_vec()), source("the depth", heights.iter().map(depths).collect())])
+}
+
+/// What the smoother has found of motion and noise.
+struct Fit {
+    /// Standard deviation of the noise over that of the dive's fixes: horizontal, vertical.
+    scale: [f64; 2],
+    /// Horizontal, vertical.
+    density: [f64; 2],
+    speed_m_s: f64,
+}
+
+impl Fit {
+    /// Fits with one density for the whole dive, found by restricted likelihood.
+    fn settle(&mut self, dive: &Dive, switches: &Switches, steps: usize) -> Result<Wiener, EstimateError> {
+        let intervals = dive.nodes_s.len() - 1;
+        for step in 0.. {
+            let [h, z] = self.density;
+            let track = self.track(dive, switches, [h, h, z].map(|q| vec![q; intervals]))?;
+            self.noise(dive, switches, &track);
+            if step == steps {
+                return Ok(track);
+            }
+            let factor = liveliness::factors(&track);
+            self.density = [0, 1].map(|i| self.density[i] * factor[i]);
+        }
+        Err(EstimateError::Undetermined { what: "usbl".into(), why: "the fit didn't end" })
+    }
+
+    fn track(
+        &self,
+        dive: &Dive,
+        switches: &Switches,
+        density: [Vec<f64>; 3],
+    ) -> Result<Wiener, EstimateError> {
+        let mut knowledge = vec![[Knowledge::default(); 3]; dive.nodes_s.len()];
+        for (e, exchange) in dive.exchanges.iter().enumerate() {
+            let node = dive.node_of[e];
+            for i in exchange.fixes.clone().filter(|&i| switches.used[i]) {
+                let fix = &dive.fixes[i];
+                for axis in 0..3 {
+                    let weight = (fix.sigma[axis] * self.scale[axis / 2]).powi(-2);
+                    knowledge[node][axis].add(fix.value[axis], weight, fix.time_s - exchange.time_s);
+                }
+            }
+        }
+        for (known, height) in knowledge.iter_mut().zip(&dive.heights) {
+            if let Some((z_m, sigma_m)) = height {
+                known[2].add(*z_m, sigma_m.powi(-2), 0.0);
+            }
+        }
+        Wiener::fit(&dive.nodes_s, &knowledge, density, self.speed_m_s)
+    }
+
+    /// The noise's scale from what is left of the fixes, the track's own share taken out.
+    fn noise(&mut self, dive: &Dive, switches: &Switches, track: &Wiener) {
+        /// What was stated is worth this many fixes.
+        const WORTH: f64 = 5.0;
+        let (mut squares, mut freedom) = ([WORTH; 2], [WORTH; 2]);
+        for (e, exchange) in dive.exchanges.iter().enumerate() {
+            let node = dive.node_of[e];
+            for axis in 0..3 {
+                let ([p, v], [pp, pv, vv]) = track.node(axis, node);
+                for i in exchange.fixes.clone().filter(|&i| switches.used[i]) {
+                    let fix = &dive.fixes[i];
+                    let dt = fix.time_s - exchange.time_s;
+                    let variance = fix.sigma[axis] * fix.sigma[axis];
+                    let left = fix.value[axis] - p - dt * v;
+                    let share =
+                        (pp + 2.0 * dt * pv + dt * dt * vv) / (variance * self.scale[axis / 2].powi(2));
+                    squares[axis / 2] += left * left / variance;
+                    freedom[axis / 2] += (1.0 - share).max(0.0);
+                }
+            }
+        }
+        self.scale = [0, 1].map(|i| (squares[i] / freedom[i]).sqrt().max(1e-3));
+    }
+}
