@@ -180,6 +180,7 @@ mod tests {
         Recorded {
             track: Track { frame_id: "enu".into(), points },
             sources: Vec::new(),
+            is_own: has_phases,
             has_phases,
             t0: None,
             fix_origin: None,
