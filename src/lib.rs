@@ -36,6 +36,7 @@ pub mod export;
 pub mod fusion;
 pub mod inspect;
 pub mod log;
+mod map;
 pub mod math;
 mod printable;
 pub mod publish;

@@ -1,7 +1,7 @@
 //! `trackfuse export`: a track out of a log.
 
 use std::io::{self, BufWriter, IsTerminal, Write};
-use std::path::Path;
+use std::path::PathBuf;
 
 use clap::ValueEnum;
 
@@ -15,7 +15,7 @@ use crate::report::ExportReport;
 use crate::source::{self, Recorded};
 
 /// Why a track can't be had in a format.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ExportError {
     /// Maps want a place on the earth.
     #[error("topic {topic:?}: no latitude and longitude of its zero is known, expected one for {format}")]
@@ -24,6 +24,27 @@ pub enum ExportError {
         topic: String,
         /// The format.
         format: &'static str,
+    },
+    /// One place is not two.
+    #[error(
+        "topic {topic:?}: its zero is known to lie at {}, expected no other `--origin`, got {}",
+        degrees(.known), degrees(.given)
+    )]
+    OtherOrigin {
+        /// The topic.
+        topic: String,
+        /// Latitude and longitude, degrees, and altitude, m, that the log says.
+        known: [f64; 3],
+        /// Those that were given.
+        given: [f64; 3],
+    },
+    /// An output whose name says another format than there is.
+    #[error(
+        "output {output:?}: no format has this ending, expected that of csv, parquet, geojson, kml or tum"
+    )]
+    Ending {
+        /// The output.
+        output: PathBuf,
     },
     /// Bytes that would steer a terminal.
     #[error("{format} is not for a terminal, expected an output")]
@@ -42,15 +63,28 @@ pub enum ExportError {
 impl ExportError {
     /// What to do about it.
     #[must_use]
-    pub fn hint(&self) -> &'static str {
-        match self {
+    pub fn hint(&self) -> String {
+        let hint = match self {
+            Self::Ending { output } if output.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) => {
+                return format!("a map in JSON is GeoJSON: `{}`", output.with_extension("geojson").display());
+            }
+            Self::Ending { .. } => "`--format FORMAT` says what to write, whatever the name",
+            Self::OtherOrigin { .. } => {
+                "leave `--origin` out; `output.origin` in the config of `fuse` says where a track's zero lies"
+            }
             Self::NoOrigin { .. } => {
                 "`--origin LAT,LON,ALT` gives it, in degrees and metres; `output.origin` in the config of `fuse` does so once \
                  and for all"
             }
             Self::ForNoTerminal { .. } | Self::NotInJson { .. } => "`-o FILE` names one",
-        }
+        };
+        hint.to_owned()
     }
+}
+
+/// A place as `--origin` takes it.
+fn degrees([latitude, longitude, altitude]: &[f64; 3]) -> String {
+    format!("{latitude},{longitude},{altitude}")
 }
 
 /// Writes a track in a format of other tools, on stdout or to a file.
@@ -59,7 +93,7 @@ impl ExportError {
 /// [`CommandError`] for a log that can't be read, a channel that holds no track, a format that the track can't be
 /// written in, and an output that can't be written.
 pub fn export(args: &Export) -> Result<Outcome, CommandError> {
-    let format = format(args);
+    let format = format(args)?;
     check_output(args, format)?;
     let bar = Bar::new(args.voice);
     let (log, damage) = open(&args.log, args.memory, args.strict, &bar)?;
@@ -73,6 +107,10 @@ pub fn export(args: &Export) -> Result<Outcome, CommandError> {
         Format::Csv | Format::Parquet | Format::Tum => None,
     };
     drop(bar);
+    if recorded.is_own && !recorded.has_phases {
+        let what = "have no place for phase, method and acceleration";
+        note(args.voice, &format!("the messages of {} {what}", args.topic));
+    }
     let written = Written { exported: Exported { topic: &args.topic, recorded: &recorded }, map, format };
     let mut report = ExportReport::new(args.log.display().to_string(), &args.topic, name(format), &recorded);
     if let Some(vertices) = written.map.as_ref().map(Map::vertices).filter(|v| *v < report.points) {
@@ -108,10 +146,17 @@ pub fn export(args: &Export) -> Result<Outcome, CommandError> {
 }
 
 /// The format that is asked for, else that of the output's ending, else CSV.
-fn format(args: &Export) -> Format {
-    let ending = args.output.as_deref().and_then(Path::extension).and_then(|e| e.to_str());
-    let of_ending = || Format::from_str(ending?, true).ok();
-    args.format.or_else(of_ending).unwrap_or(Format::Csv)
+fn format(args: &Export) -> Result<Format, ExportError> {
+    let ending = args.output.as_deref().and_then(|output| Some((output, output.extension()?)));
+    match (args.format, ending) {
+        (Some(format), _) => Ok(format),
+        (None, None) => Ok(Format::Csv),
+        (None, Some((_, ending))) if ending.eq_ignore_ascii_case("txt") => Ok(Format::Csv),
+        (None, Some((output, ending))) => ending
+            .to_str()
+            .and_then(|ending| Format::from_str(ending, true).ok())
+            .ok_or_else(|| ExportError::Ending { output: output.to_owned() }),
+    }
 }
 
 /// Refuses formats that can't go where they should, before any work is done.
@@ -129,10 +174,17 @@ fn check_output(args: &Export, format: Format) -> Result<(), ExportError> {
 /// The track as a map shows it, with the characteristic points beside it.
 fn map(args: &Export, format: Format, log: &Log, recorded: &mut Recorded) -> Result<Map, CommandError> {
     let (topic, format) = (args.topic.clone(), name(format));
-    let origin = args.origin.or(recorded.fix_origin).ok_or(ExportError::NoOrigin { topic, format })?;
-    let of_a_track = recorded.has_phases && args.topic.ends_with("/track");
-    let (events, left_out) =
-        if of_a_track { source::recorded_events(log, &args.topic)? } else { Default::default() };
+    let origin = match (recorded.fix_origin, args.origin) {
+        (Some(known), Some(given)) if known != given => {
+            return Err(ExportError::OtherOrigin { topic, known, given }.into());
+        }
+        (known, given) => known.or(given).ok_or(ExportError::NoOrigin { topic, format })?,
+    };
+    let (events, left_out) = if recorded.is_own && args.topic.ends_with("/track") {
+        source::recorded_events(log, &args.topic)?
+    } else {
+        Default::default()
+    };
     let new: Vec<String> = left_out.into_iter().filter(|w| !recorded.warnings.contains(w)).collect();
     recorded.warnings.extend(new);
     Ok(Map::new(Exported { topic: &args.topic, recorded }, &events, origin))

@@ -135,7 +135,7 @@ impl CommandError {
             Self::Log(error) => error.hint(),
             Self::Source(error) => error.hint(),
             Self::Resolve(error) => Some(error.hint()),
-            Self::Export(error) => Some(error.hint().into()),
+            Self::Export(error) => Some(error.hint()),
             Self::File { .. } => {
                 Some("a scenario is a TOML file, such as `sample_logs/steep_climb.scenario.toml`".into())
             }

@@ -11,8 +11,8 @@ use quick_xml::events::{BytesDecl, BytesText, Event};
 use serde_json::{Map as Object, Value};
 
 use super::Map;
+use crate::map::phase_color;
 use crate::printable::printable;
-use crate::publish::phase_color;
 use crate::track::Phase;
 
 const LINE_PX: &str = "3";

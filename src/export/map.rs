@@ -3,6 +3,7 @@
 use serde_json::{Map as Object, Value, json};
 
 use super::Exported;
+use crate::map::place;
 use crate::math::geodesy::{Geodetic, LocalFrame};
 use crate::math::polyline::{Rank, Vertex, thin};
 use crate::math::robust;
@@ -119,14 +120,6 @@ fn mark(event: &RecordedEvent, frame: &LocalFrame, t0: Time) -> Option<MapMark> 
     Some(MapMark { name: event.name.clone(), place: place(frame, event.position)?, properties })
 }
 
-/// Longitude and latitude to 1e-9 degrees, altitude to 0.1 mm; `None` where the numbers are too large for a place.
-fn place(frame: &LocalFrame, enu: [f64; 3]) -> Option<[f64; 3]> {
-    let [latitude, longitude, altitude] = frame.to_geodetic(enu).to_degrees();
-    let place =
-        [(longitude * 1e9).round() / 1e9, (latitude * 1e9).round() / 1e9, (altitude * 1e4).round() / 1e4];
-    place.iter().all(|v| v.is_finite()).then_some(place)
-}
-
 fn micro(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }
@@ -180,6 +173,7 @@ mod tests {
         Recorded {
             track: Track { frame_id: "enu".into(), points },
             sources: Vec::new(),
+            is_own: has_phases,
             has_phases,
             t0: None,
             fix_origin: None,

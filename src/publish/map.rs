@@ -6,9 +6,10 @@ use serde_json::{Value, json};
 use super::fields::{Stamp, rounded};
 use super::lines::track_lines;
 use super::payload::Payload;
-use super::scene::{MARKS, TRACK_VERTICES, phase_color};
+use super::scene::{MARKS, TRACK_VERTICES};
 use super::{CHILD_FRAME, Context, Published, Topic, ros};
 use crate::fusion::Fusion;
+use crate::map::{feature, place, web_color};
 use crate::math::geodesy::LocalFrame;
 use crate::time::Time;
 use crate::track::{Phase, TrackPoint};
@@ -54,21 +55,23 @@ impl Payload for GeoJsonMessage {
     type Ros = Self;
 }
 
-/// The places of a track's points, thinned.
+/// The places of a track's points, thinned, and always that of the last.
 pub(super) fn fix_messages<'a>(
     fusion: &'a Fusion,
     context: Context<'a>,
 ) -> impl Iterator<Item = Published> + 'a {
     let step = (context.rate_hz / MOST_HZ - 1e-9).ceil().max(1.0) as usize;
     let frame = context.geodetic;
-    fusion.track.points.iter().step_by(step).filter_map(move |point| {
+    let points = &fusion.track.points;
+    let last = points.last().filter(|_| !(points.len() - 1).is_multiple_of(step));
+    points.iter().step_by(step).chain(last).filter_map(move |point| {
         let message = fix_message(point, &frame?)?;
         Some(context.publish(Topic::Fix, point.time, message))
     })
 }
 
 fn fix_message(point: &TrackPoint, frame: &LocalFrame) -> Option<FixMessage> {
-    let [longitude, latitude, altitude] = place(point.state.position, frame)?;
+    let [longitude, latitude, altitude] = place(frame, point.state.position)?;
     // the sigmas are along the axes at the origin, which turn by 1e-5 rad in 60 m
     let variances = rounded(point.state.position_sigma.map(|s| s * s), 1e9).map(<[f64; 3]>::from);
     let [east, north, up] = variances.unwrap_or_default();
@@ -83,13 +86,6 @@ fn fix_message(point: &TrackPoint, frame: &LocalFrame) -> Option<FixMessage> {
     })
 }
 
-/// Longitude and latitude, degrees, to a millimetre or so, and altitude, m, as GeoJSON has them.
-fn place(enu: [f64; 3], frame: &LocalFrame) -> Option<[f64; 3]> {
-    let [latitude, longitude, altitude] = frame.to_geodetic(enu).to_degrees();
-    let round = |v: f64, parts: f64| Some((v * parts).round() / parts).filter(|v| v.is_finite());
-    Some([round(longitude, 1e8)?, round(latitude, 1e8)?, round(altitude, 1e3)?])
-}
-
 /// The whole track as lines by phase, and the characteristic points, at `time`.
 pub(super) fn geojson_message(
     fusion: &Fusion,
@@ -97,26 +93,14 @@ pub(super) fn geojson_message(
     frame: &LocalFrame,
     time: Time,
 ) -> Published {
-    let feature = |kind: &str, coordinates: Value, properties: Value| {
-        json!({
-            "type": "Feature",
-            "properties": properties,
-            "geometry": { "type": kind, "coordinates": coordinates },
-        })
-    };
-    let color = |phase: Phase| {
-        let [r, g, b] = phase_color(phase).0;
-        format!("#{r:02x}{g:02x}{b:02x}")
-    };
+    let style = |phase: Phase| json!({ "color": web_color(phase), "weight": 3, "opacity": 1 });
     let lines = track_lines(fusion, context, TRACK_VERTICES).into_iter().filter_map(|line| {
-        let places: Vec<[f64; 3]> = line.points.iter().map(|p| place(*p, frame)).collect::<Option<_>>()?;
-        let style = json!({ "color": color(line.kind), "weight": 3, "opacity": 1 });
-        Some(feature("LineString", json!(places), json!({ "name": line.kind.name(), "style": style })))
+        let places: Vec<[f64; 3]> = line.points.iter().map(|p| place(frame, *p)).collect::<Option<_>>()?;
+        Some(feature(&places, json!({ "name": line.kind.name(), "style": style(line.kind) })))
     });
     let points = fusion.events.iter().take(MARKS).filter_map(|event| {
-        let place = place(event.state.position, frame)?;
-        let style = json!({ "color": color(event.phase), "weight": 3, "opacity": 1 });
-        Some(feature("Point", json!(place), json!({ "name": event.name, "style": style })))
+        let place = place(frame, event.state.position)?;
+        Some(feature(&[place], json!({ "name": event.name, "style": style(event.phase) })))
     });
     let features: Vec<Value> = lines.chain(points).collect();
     let geojson = json!({ "type": "FeatureCollection", "features": features }).to_string();

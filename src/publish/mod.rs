@@ -19,7 +19,6 @@ mod scene;
 pub(crate) use fields::{Stamp, Xyz};
 pub(crate) use payload::cdr;
 pub use point::track_messages;
-pub(crate) use scene::phase_color;
 
 use event::event_message;
 use fields::drawn_in;

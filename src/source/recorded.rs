@@ -26,6 +26,8 @@ pub struct Recorded {
     pub track: Track,
     /// The sources that its points name, by bit of [`TrackPoint::seen_by`]; the topic where it names none.
     pub sources: Vec<String>,
+    /// Whether this program wrote it, by its schema or, in ROS 2's own types, by the log's metadata.
+    pub is_own: bool,
     /// Whether phases and methods are the channel's own; else they mean nothing.
     pub has_phases: bool,
     /// T0 as the log's metadata has it for this track.
@@ -57,8 +59,9 @@ pub fn recorded(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
     let is_own = |c| index.schema_of(c).is_some_and(|s| s.name == TRACK_SCHEMA);
     let mut recorded =
         if index.channels_of(topic).any(is_own) { own_track(log, topic) } else { foreign_track(log, topic) }?;
-    let prefix = topic.rsplit_once('/').map_or(topic, |(prefix, _)| prefix);
+    let (prefix, name) = topic.rsplit_once('/').unwrap_or((topic, ""));
     if let Some(mut metadata) = log.metadata(&format!("trackfuse:{prefix}"))? {
+        recorded.is_own |= matches!(name, "track" | "pcf");
         recorded.t0 = t0_of(&metadata);
         recorded.fix_origin = recorded.fix_origin.or(config_of(&metadata).output.origin);
         recorded.made_of = topics_of(&metadata);
@@ -239,6 +242,7 @@ fn own_track(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
     Ok(Recorded {
         track,
         sources: names.list,
+        is_own: true,
         has_phases: true,
         t0: None,
         fix_origin: None,
@@ -363,6 +367,7 @@ fn foreign_track(log: &Log, topic: &str) -> Result<Recorded, SourceError> {
     Ok(Recorded {
         track: Track { frame_id: loaded.frame_id, points },
         sources: vec![topic.to_owned()],
+        is_own: false,
         has_phases: false,
         t0: None,
         fix_origin: loaded.fix_origin,

@@ -54,7 +54,7 @@ fn export_to_a_file_is_that_of_stdout_and_never_replaces_one_unasked() {
     assert_eq!(run(&["-o", "track.csv", "--force"]).code, 0);
     assert_eq!(fs::read_to_string(trial.path("track.csv")).unwrap(), printed);
     let log = fs::read(trial.path("in.fused.mcap")).unwrap();
-    let refused = run(&["-o", "in.fused.mcap", "--force"]);
+    let refused = run(&["-o", "in.fused.mcap", "--force", "--format", "csv"]);
     assert_eq!(refused.code, 2, "{refused:#?}");
     assert_says(&refused.stderr, &["is the input itself"]);
     assert!(fs::read(trial.path("in.fused.mcap")).unwrap() == log, "the log is as it was");
@@ -182,4 +182,53 @@ fn export_of_a_sensor_to_a_map_has_neither_phases_nor_sigmas() {
     let map: Value = serde_json::from_str(&ran.stdout).unwrap();
     assert!(map["features"][0]["properties"].get("phase").is_none());
     assert_eq!(map["features"][0]["properties"]["x_sigma_max_m"], Value::Null);
+}
+
+#[test]
+fn export_to_an_ending_that_no_format_has_is_refused_with_the_formats() {
+    let trial = exported();
+    let run = |args: &[&str]| trackfuse(trial.folder(), &[&["export", "in.fused.mcap"], args].concat());
+    for (name, hint) in [("x.gpx", "`--format FORMAT`"), ("x.json", "`x.geojson`")] {
+        let ran = run(&["-o", name]);
+        assert_eq!(ran.code, 2, "{ran:#?}");
+        assert_says(&ran.stderr, &[name, "csv, parquet, geojson, kml or tum", "\nhint: ", hint]);
+        assert!(!trial.path(name).exists());
+        assert_eq!(run(&["-o", name, "--format", "csv"]).code, 0);
+    }
+    assert_says(&run(&["-o", "bare"]).stdout, &["(csv, "]);
+}
+
+#[test]
+fn export_out_of_ros_2_messages_keeps_the_characteristic_points_and_says_what_they_have_no_place_for() {
+    let config = "[output]\nencoding = \"cdr\"\norigin = [59.4, 10.5, 3.0]\n[[characteristic_point]]\n\
+                  name = \"half way\"\nz_m = -30.0\n";
+    let trial = Trial::of(two_sensors()).config(config);
+    assert_eq!(trial.fuse(&[]).code, 0);
+    let ran = trackfuse(trial.folder(), &["export", "in.fused.mcap", "--format", "geojson"]);
+    assert_eq!(ran.code, 0, "{ran:#?}");
+    assert_says(&ran.stderr, &["no place for phase, method and acceleration"]);
+    let map: Value = serde_json::from_str(&ran.stdout).unwrap();
+    let features = map["features"].as_array().unwrap();
+    let marks: Vec<_> = features.iter().filter_map(|f| f["properties"]["name"].as_str()).collect();
+    assert_eq!(marks, ["half way"]);
+    let pose = ["export", "in.fused.mcap", "--topic", "/fused/pose", "--format", "geojson"];
+    assert!(
+        !trackfuse(trial.folder(), &pose).stdout.contains("\"name\":\"half way\""),
+        "they are the track's"
+    );
+}
+
+#[test]
+fn export_moves_no_track_whose_place_is_known() {
+    let trial = exported();
+    let run = |origin: &str| {
+        trackfuse(trial.folder(), &["export", "in.fused.mcap", "--format", "kml", "--origin", origin])
+    };
+    let ran = run("-33.9,18.4,0");
+    assert_eq!((ran.code, ran.stdout.as_str()), (2, ""));
+    assert_says(
+        &ran.stderr,
+        &["\"/fused/track\"", "59.4,10.5,3", "-33.9,18.4,0", "\nhint: leave `--origin` out"],
+    );
+    assert_eq!(run("59.4,10.5,3").code, 0, "the same is no move");
 }

@@ -82,8 +82,9 @@ fn fixes_of_the_track_lie_where_the_track_does_and_a_map_gets_its_lines_and_poin
         frame.to_enu(Geodetic::from_degrees(degrees))
     };
     let (fixes, track) = (&output.topics["/fused/fix"], output.track());
-    assert!(fixes.len() * 2 == track.len() || fixes.len() * 2 == track.len() + 1, "10 Hz of 20 Hz");
-    for (fix, point) in fixes.iter().zip(track.iter().step_by(2)) {
+    assert_eq!(fixes.len(), track.len() / 2 + 1, "10 Hz of 20 Hz, and the last");
+    let last = (track.len() % 2 == 0).then(|| track.last().unwrap());
+    for (fix, point) in fixes.iter().zip(track.iter().step_by(2).chain(last)) {
         let (p, sigma) = (point.vector("position"), point.vector("position_sigma"));
         let at = enu(&fix.value["latitude"], &fix.value["longitude"], &fix.value["altitude"]);
         assert_eq!(fix.log_time, point.log_time);
@@ -113,6 +114,28 @@ fn fixes_of_the_track_lie_where_the_track_does_and_a_map_gets_its_lines_and_poin
         (0..3)
             .all(|i| (enu(&first[1], &first[0], &first[2])[i] - track[0].vector("position")[i]).abs() < 2e-3)
     );
+}
+
+#[test]
+fn fixes_on_both_sides_of_the_antimeridian_make_lines_that_end_on_it() {
+    // 3 m from it at this latitude
+    let config = "[output]\norigin = [59.4, 179.99995, 3.0]\n";
+    let (_, output) = Trial::of(super::trial_log::two_sensors()).config(config).report(0);
+    let map = output.topics["/fused/geojson"][0].value["geojson"].as_str().unwrap();
+    let map: Value = serde_json::from_str(map).unwrap();
+    let mut cuts = 0;
+    for geometry in map["features"].as_array().unwrap().iter().map(|f| &f["geometry"]) {
+        assert_ne!(geometry["type"], "Point");
+        let whole = json!([geometry["coordinates"]]);
+        let is_cut = geometry["type"] == "MultiLineString";
+        cuts += usize::from(is_cut);
+        for line in if is_cut { &geometry["coordinates"] } else { &whole }.as_array().unwrap() {
+            let longitudes: Vec<f64> =
+                line.as_array().unwrap().iter().map(|p| p[0].as_f64().unwrap()).collect();
+            assert!(longitudes.windows(2).all(|w| (w[1] - w[0]).abs() < 1.0), "{longitudes:?}");
+        }
+    }
+    assert!(cuts > 0, "the track crosses it");
 }
 
 #[test]

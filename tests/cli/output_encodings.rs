@@ -76,6 +76,22 @@ fn as_json(value: &Value) -> Value {
 }
 
 #[test]
+fn output_as_a_path_ends_where_the_track_does_however_long_it_is() {
+    for rate_hz in [1500, 1501, 1503] {
+        let config = format!("[output]\nencoding = \"cdr\"\nrate_hz = {rate_hz}.0\n");
+        let trial = Trial::of(two_sensors()).config(&config);
+        assert_eq!(trial.fuse(&[]).code, 0);
+        let topics = topics(&trial.path("in.fused.mcap"));
+        let (track, path) = (&topics["/fused/track"].messages, &topics["/fused/path"].messages[0]["poses"]);
+        let poses = path.as_array().unwrap();
+        assert!(track.len() > 10_000 && poses.len() == 10_000, "{} of {}", poses.len(), track.len());
+        for (pose, point) in [(&poses[0], &track[0]), (&poses[9999], &track[track.len() - 1])] {
+            assert_eq!(pose["header"]["stamp"], point["header"]["stamp"], "{rate_hz} Hz");
+        }
+    }
+}
+
+#[test]
 fn output_as_protobuf_says_what_it_says_as_json_field_by_field() {
     let [expected, found] = ["json", "protobuf"].map(|e| topics(&fused(e).path("in.fused.mcap")));
     assert_eq!(expected.keys().collect::<Vec<_>>(), found.keys().collect::<Vec<_>>());

@@ -20,6 +20,7 @@ use super::point::PointMessage;
 use super::pose::PoseMessage;
 use super::residual::ResidualMessage;
 use super::{Published, Topic};
+use crate::math::polyline::{Rank, Vertex, thin};
 use crate::time::Time;
 use crate::track::Track;
 
@@ -137,8 +138,10 @@ const PATH_POSES: usize = 10_000;
 /// The whole track as a path in `frame_id`, at `time`.
 pub(super) fn path_message(track: &Track, frame_id: &str, time: Time) -> Published {
     let header = |time| Header::new(Some(Stamp::of(time)), frame_id.to_owned());
-    let step = track.points.len().div_ceil(PATH_POSES).max(1);
-    let poses = track.points.iter().step_by(step).filter_map(|point| {
+    let points = &track.points;
+    let vertex = |i: usize| Vertex { position: points[i].state.position, rank: Rank::Inner, label: i };
+    let poses = thin(points.len(), vertex, PATH_POSES).into_iter().filter_map(|vertex| {
+        let point = &points[vertex.label];
         let position = super::fields::xyz(point.state.position)?;
         Some(PoseStamped { header: header(point.time), pose: RosPose::at(Some(position)) })
     });

@@ -13,6 +13,7 @@ use super::fields::{Pose, Stamp, Xyz, drawn_in, milli};
 use super::lines::{Polyline, breaks, polylines, track_lines};
 use super::{Context, Published, Topic};
 use crate::fusion::Fusion;
+use crate::map::phase_color;
 use crate::quality::BAND_SIGMAS;
 use crate::sample::{Quantity, Source};
 use crate::time::Time;
@@ -30,16 +31,6 @@ const LABEL_PX: f64 = 14.0;
 
 /// Diameter of a characteristic point over the picture's diagonal.
 const MARK_SHARE: f64 = 0.008;
-
-/// Colours that people tell apart whatever their sight (Okabe & Ito 2008), on dark and on light ground.
-pub(crate) fn phase_color(phase: Phase) -> ([u8; 3], &'static str) {
-    match phase {
-        Phase::Single => ([86, 180, 233], "sky blue"),
-        Phase::Overlap => ([0, 158, 115], "green"),
-        Phase::Bridged => ([230, 159, 0], "orange"),
-        Phase::Extrapolated => ([213, 94, 0], "vermilion"),
-    }
-}
 
 /// Those that no phase has, again and again.
 fn source_color(index: usize) -> [u8; 3] {
