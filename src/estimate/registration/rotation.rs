@@ -32,6 +32,9 @@ const MOVES: f64 = 1.5;
 /// straight or at rest shows neither.
 const MIRRORED: f64 = 0.3;
 
+/// A drift of so many standard deviations is not taken for axes that are mirrored.
+const DRIFT_SIGMAS: f64 = 2.0;
+
 /// A turn is clear that leaves less than this share of what none leaves, by more than an angle that a late clock could
 /// feign on a curve, rad.
 const CLEAR: f64 = 0.3;
@@ -172,7 +175,7 @@ pub(super) fn mirrored(
         let middle_s = pairs.iter().map(|p| p.time_s).sum::<f64>() / pairs.len() as f64;
         let away_s =
             robust::median(&mut pairs.iter().map(|p| (p.time_s - middle_s).abs()).collect::<Vec<_>>());
-        drifted_m = f64::max(drifted_m, SIGNIFICANT_SIGMAS * priors.drift_m_s * away_s.unwrap_or(0.0));
+        drifted_m = f64::max(drifted_m, DRIFT_SIGMAS * priors.drift_m_s * away_s.unwrap_or(0.0));
         let swapped: Vec<Pair> =
             pairs.iter().map(|p| Pair { source: [p.source[1], p.source[0], p.source[2]], ..*p }).collect();
         for (i, (pairs, sign)) in [(&pairs, 1.0), (&swapped, -1.0)].into_iter().enumerate() {
