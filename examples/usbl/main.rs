@@ -7,7 +7,7 @@
 //! Without `--page` the tables are printed. The same arguments give the same tables.
 
 mod judge;
-#[path = "../study/page.rs"]
+#[path = "../shared/page.rs"]
 mod page;
 
 use std::fmt::Write as _;
