@@ -14,7 +14,7 @@ use super::{LogError, Observer, Work, interrupt};
 /// that blocks can be shared.
 const PIECE: u64 = 64 << 20;
 
-/// A copy that gets on beside other work: the kernel does it, and waits for the disk. Given up when dropped.
+/// A copy that gets on beside other work, to the disk: the kernel does it. Given up when dropped.
 #[derive(Debug)]
 pub(super) struct Copying {
     stop: Arc<AtomicBool>,
@@ -92,6 +92,7 @@ impl Copy {
             copied += read;
             self.observer.tell(Work::Copy, copied, len);
         }
-        Ok(())
+        // the disk, too, has time now, and the sync at the end little left to do
+        if self.stop.load(Ordering::Relaxed) { Ok(()) } else { self.to.sync_data().map_err(written) }
     }
 }
