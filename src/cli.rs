@@ -33,7 +33,28 @@ pub enum Command {
     ///
     /// The original is not touched: the output is a new log whose data section begins with every byte of the
     /// original's. `--in-place` appends to the log itself. `trackfuse restore` leads back from both.
-    Fuse(Fuse),
+    #[command(after_help = "Examples:
+  trackfuse fuse dive.mcap                       writes dive.fused.mcap
+  trackfuse fuse dive.mcap --config dive.toml    names sources, heights, horizon, ...
+  trackfuse fuse dive.mcap --in-place            adds to dive.mcap: needs no second copy of a large log
+  trackfuse fuse dive.mcap --sidecar track.mcap  writes the new channels only, for viewers that merge logs
+  trackfuse fuse dive.mcap --report dive.html    writes a report with plots for the browser, too
+
+Exit codes: 0 done; 1 failed, nothing written; 2 usage or config wrong, sources ambiguous, output
+exists; 3 done, with warnings that a person must read")]
+    Fuse(Addition),
+    /// Clean a USBL system's fixes of a dive: a track through silences, a prediction, and what was thrown out and why
+    ///
+    /// The fixes are those of the one topic with `usbl` in its name, or those that `[usbl]` in a config names. Writes the
+    /// smoothed track, what a causal method predicts as the fixes come in, and every fix with its verdict.
+    #[command(after_help = "Examples:
+  trackfuse usbl dive.mcap                       writes dive.usbl.mcap
+  trackfuse usbl dive.mcap --config dive.toml    names the fixes, a depth channel, the speed limit, ...
+  trackfuse compare dive.usbl.mcap --estimate /usbl/prediction --reference /usbl/track
+
+Exit codes: 0 done; 1 failed, nothing written; 2 usage or config wrong, fixes ambiguous, output exists;
+3 done, with warnings that a person must read")]
+    Usbl(Addition),
     /// Get the original log, bit for bit, out of a log that trackfuse added to
     ///
     /// Where a run with `--in-place` was cut off, this puts the original back. Else it takes off what runs that
@@ -89,25 +110,16 @@ fn bytes(text: &str) -> Result<u64, String> {
     bytes.ok_or_else(|| format!("expected a size up to 1024GiB, such as 512MB or 4GiB, got {text:?}"))
 }
 
-/// Arguments of `fuse`.
+/// Arguments of commands that add a track to a log.
 #[expect(clippy::struct_excessive_bools, reason = "each is a flag")]
 #[derive(Args, Debug)]
-#[command(after_help = "Examples:
-  trackfuse fuse dive.mcap                       writes dive.fused.mcap
-  trackfuse fuse dive.mcap --config dive.toml    names sources, heights, horizon, ...
-  trackfuse fuse dive.mcap --in-place            adds to dive.mcap: needs no second copy of a large log
-  trackfuse fuse dive.mcap --sidecar track.mcap  writes the new channels only, for viewers that merge logs
-  trackfuse fuse dive.mcap --report dive.html    writes a report with plots for the browser, too
-
-Exit codes: 0 done; 1 failed, nothing written; 2 usage or config wrong, sources ambiguous, output
-exists; 3 done, with warnings that a person must read")]
-pub struct Fuse {
+pub struct Addition {
     /// The log to read
     pub log: PathBuf,
     /// A config; without one, sources are recognised by their topics' names
     #[arg(long, short, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// The log to write [default: LOG with .fused.mcap for .mcap]
+    /// The log to write [default: LOG with .fused.mcap, or .usbl.mcap, for .mcap]
     #[arg(long, short, value_name = "OUT")]
     pub output: Option<PathBuf>,
     /// Append to LOG itself. Cut off at any moment, the next run or `trackfuse restore` puts LOG back
@@ -125,7 +137,7 @@ pub struct Fuse {
     /// Refuse a log that is damaged, instead of using what can be trusted; reads all of it, for its checksum
     #[arg(long)]
     pub strict: bool,
-    /// Prefix of the new topics [default: the config's, else /fused]
+    /// Prefix of the new topics [default: the config's, else /fused or /usbl]
     #[arg(long)]
     pub prefix: Option<String>,
     /// Read every chunk with sources whole and check its checksum, also uncompressed ones of which less would do

@@ -29,6 +29,7 @@ fn main() -> ExitCode {
     let _ = heed_signals();
     let done = match &Cli::parse().command {
         Command::Fuse(args) => commands::fuse(args),
+        Command::Usbl(args) => commands::usbl(args),
         Command::Compare(args) => commands::compare(args),
         Command::Export(args) => commands::export(args),
         Command::Simulate(args) => commands::simulate(args),

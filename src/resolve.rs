@@ -7,8 +7,11 @@ use crate::estimate::characteristic_point::Height;
 use crate::estimate::coverage;
 use crate::estimate::extrapolation::{self, Choice, Law, LawKind};
 use crate::estimate::registration::{self, Kind};
+use crate::estimate::usbl;
+use crate::fusion::usbl::{Causal, DivePlan};
 use crate::fusion::{self, Fusion, Plan};
 use crate::log::Log;
+use crate::math::robust;
 use crate::sample::Source;
 use crate::source::Loaded;
 use crate::time::Time;
@@ -142,6 +145,48 @@ fn rate_hz(config: &Config, sources: &[Source], warnings: &mut Vec<String>) -> R
          to {lowered:.2}; set `output.rate_hz` for another rate"
     ));
     Ok(lowered)
+}
+
+/// Points a second of a dive's track, where the config says nothing: a heavy vehicle does nothing new within one.
+const DIVE_RATE_HZ: f64 = 1.0;
+
+/// What is to be done for a dive's fixes; what was resolved goes back into the config.
+///
+/// # Errors
+/// [`ResolveError::TooManyPoints`].
+pub fn dive_plan(
+    config: &mut Config,
+    loaded: &Loaded,
+    fixes: &Source,
+    origin: Time,
+) -> Result<DivePlan, ResolveError> {
+    let span_s = fixes.span_s().map_or(0.0, |(from, to)| to - from);
+    let rate_hz = match config.output.rate_hz {
+        Some(rate_hz) if rate_hz * span_s > MAX_POINTS => {
+            let points = rate_hz * span_s;
+            return Err(ResolveError::TooManyPoints { rate_hz, span_s, points, most: MAX_POINTS });
+        }
+        asked => asked.unwrap_or(DIVE_RATE_HZ.min(MAX_POINTS / span_s)),
+    };
+    config.output.rate_hz = Some(rate_hz);
+    let frame_id = config.output.frame_id.get_or_insert_with(|| loaded.frame_id.clone()).clone();
+    config.output.surface_at_zero.get_or_insert_with(|| {
+        let mut heights: Vec<f64> = fixes.positions.iter().map(|p| p.value[2]).collect();
+        // of wild fixes some lie above the surface
+        robust::median(&mut heights).is_some_and(|z| z < -2.0)
+    });
+    let usbl = &config.usbl;
+    Ok(DivePlan {
+        origin,
+        frame_id,
+        rate_hz,
+        settings: usbl::Settings { speed_limit_m_s: usbl.speed_limit_m_s, ..usbl::Settings::default() },
+        cycle_s: usbl.cycle_s,
+        causal: match usbl.prediction {
+            config::Causal::Improved => Causal::Improved,
+            config::Causal::Paper => Causal::Paper,
+        },
+    })
 }
 
 /// What the track may be carried on by: what is asked for, then the others, for comparison. Each law is fitted to the

@@ -93,6 +93,15 @@ pub enum Method {
     /// Constant force and quadratic drag, for extrapolation only.
     #[serde(rename = "drag")]
     Drag,
+    /// The robust smoother of USBL fixes.
+    #[serde(rename = "usbl")]
+    Usbl,
+    /// USBL fixes by the past alone, improved.
+    #[serde(rename = "usbl-causal")]
+    UsblCausal,
+    /// The same as the paper prints it.
+    #[serde(rename = "usbl-paper")]
+    UsblPaper,
 }
 
 impl Method {
@@ -105,6 +114,9 @@ impl Method {
             Self::Spline => "sff",
             Self::MovingAverage => "moving-average",
             Self::Drag => "drag",
+            Self::Usbl => "usbl",
+            Self::UsblCausal => "usbl-causal",
+            Self::UsblPaper => "usbl-paper",
         }
     }
 }

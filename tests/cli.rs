@@ -30,6 +30,7 @@ mod cli {
     mod sources;
     mod trial;
     mod trial_log;
+    mod usbl;
     mod verify;
     mod viewer_topics;
 }

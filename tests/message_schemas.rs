@@ -12,7 +12,8 @@ use trackfuse::publish::Topic;
 #[test]
 fn every_descriptor_set_is_what_its_proto_file_says() {
     let schemas = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas");
-    let mut names: Vec<String> = Topic::written(Encoding::Protobuf, true)
+    let all = [&Topic::FUSED[..], &Topic::USBL].concat();
+    let mut names: Vec<String> = Topic::written(&all, Encoding::Protobuf, true)
         .iter()
         .map(|topic| topic.channel("", Encoding::Protobuf).schema_name)
         .collect();
@@ -20,7 +21,7 @@ fn every_descriptor_set_is_what_its_proto_file_says() {
     names.push("trackfuse.TrackSample".into());
     names.sort();
     names.dedup();
-    assert_eq!(names.len(), 9);
+    assert_eq!(names.len(), 10);
     for name in names {
         let mut compiler = protox::Compiler::new([schemas.join("proto")]).unwrap();
         compiler.include_imports(true).open_file(format!("{}.proto", name.replace('.', "/"))).unwrap();

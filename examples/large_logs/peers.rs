@@ -64,7 +64,8 @@ pub(crate) fn rewrite(input: &Path, output: &Path, fitted: &Fitted) {
     for message in mcap::io::MessageReader::new(source) {
         writer.write(&message.expect("a message")).expect("room on the disk");
     }
-    let new = Topic::channels(&Topic::written(Encoding::Json, false), "/fused", Encoding::Json);
+    let new =
+        Topic::channels(&Topic::written(&Topic::FUSED, Encoding::Json, false), "/fused", Encoding::Json);
     let mut channel = |new: &NewChannel| {
         let schema =
             writer.add_schema(&new.schema_name, &new.schema_encoding, &new.schema).expect("a schema");

@@ -4,13 +4,13 @@ use std::io::Write;
 use std::path::Path;
 
 use super::CommandError;
-use crate::cli::Fuse;
+use crate::cli::Addition;
 use crate::log::{Destination, Log, LogError, NewMetadata, Prepared, check_name};
 use crate::printable::shell_word;
-use crate::report::html;
+use crate::report::html::Page;
 
 /// Refuses the page's name before any work is done.
-pub(super) fn check(args: &Fuse, log: &Log, destination: &Destination) -> Result<(), CommandError> {
+pub(super) fn check(args: &Addition, log: &Log, destination: &Destination) -> Result<(), CommandError> {
     let Some(page) = &args.report else { return Ok(()) };
     log.ensure_other(page)?;
     check_name(page, args.force)?;
@@ -25,15 +25,15 @@ pub(super) fn check(args: &Fuse, log: &Log, destination: &Destination) -> Result
     Ok(())
 }
 
-/// Writes the page, all but its name.
+/// Writes the page, all but its name; it is made of the track's provenance and of its config.
 pub(super) fn prepare(
-    args: &Fuse,
-    parts: html::fusion::Parts<'_>,
+    args: &Addition,
     metadata: &NewMetadata,
+    page: impl FnOnce(&[(String, String)], &str) -> Page,
 ) -> Result<Option<Prepared>, LogError> {
     let Some(out) = &args.report else { return Ok(None) };
     let config = metadata.entries.get("config").map_or("", String::as_str);
-    let page = html::fusion::page(parts, &provenance(metadata), config).render();
+    let page = page(&provenance(metadata), config).render();
     let written = |source| LogError::Write { path: out.clone(), source };
     Prepared::new(out, args.force, |file| file.write_all(page.as_bytes()).map_err(written)).map(Some)
 }

@@ -1,5 +1,6 @@
 //! The commands: each holds the order of its steps, and nothing else.
 
+mod addition;
 mod compare;
 mod completions;
 mod export;
@@ -11,6 +12,7 @@ mod man;
 mod progress;
 mod restore;
 mod simulate;
+mod usbl;
 
 pub use compare::compare;
 pub use completions::completions;
@@ -21,6 +23,7 @@ pub use inspect::inspect;
 pub use man::man;
 pub use restore::restore;
 pub use simulate::simulate;
+pub use usbl::usbl;
 
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};

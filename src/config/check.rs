@@ -54,6 +54,13 @@ impl Config {
             fusion.window_points.to_string(),
             "1 to 100000",
         )?;
+        let usbl = &self.usbl;
+        positive("usbl.sigma_m", usbl.sigma_m)?;
+        positive("usbl.depth_sigma_m", Some(usbl.depth_sigma_m))?;
+        positive("usbl.speed_limit_m_s", Some(usbl.speed_limit_m_s))?;
+        positive("usbl.cycle_s", usbl.cycle_s)?;
+        let latency_ok = usbl.latency_s.is_finite();
+        range(latency_ok, "usbl.latency_s".into(), usbl.latency_s.to_string(), "a finite number")?;
         let priors = &self.registration;
         for kind in Kind::ALL {
             let key = format!("registration's {}", kind.name());

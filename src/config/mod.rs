@@ -7,8 +7,10 @@ mod check;
 #[cfg(test)]
 mod guide;
 mod template;
+mod usbl;
 
 pub use template::{SourceTable, template};
+pub use usbl::{Causal, Usbl};
 
 use std::path::{Path, PathBuf};
 
@@ -94,13 +96,15 @@ pub struct Config {
     pub extrapolation: Extrapolation,
     /// Heights whose first upward crossing is reported.
     pub characteristic_point: Vec<CharacteristicPoint>,
+    /// The fixes that `trackfuse usbl` cleans, and how.
+    pub usbl: Usbl,
 }
 
 /// The output.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Output {
-    /// Prefix of the new topics.
+    /// Prefix of the new topics; `trackfuse usbl` takes /usbl instead of /fused.
     pub prefix: String,
     /// Points of the track a second; default: the fastest source's rate.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -132,10 +136,15 @@ pub struct Output {
     pub surface_at_zero: Option<bool>,
 }
 
+impl Output {
+    /// The prefix of a fused track's topics.
+    pub const PREFIX: &str = "/fused";
+}
+
 impl Default for Output {
     fn default() -> Self {
         Self {
-            prefix: "/fused".into(),
+            prefix: Self::PREFIX.into(),
             rate_hz: None,
             frame_id: None,
             origin: None,

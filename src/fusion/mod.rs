@@ -11,6 +11,7 @@ mod bands;
 mod carried;
 mod pieces;
 mod registered;
+pub mod usbl;
 
 use bands::{Bands, Unregistered, warn_of_disagreement, warn_of_misfit};
 use carried::Carried;

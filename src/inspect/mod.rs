@@ -182,7 +182,9 @@ fn fuse(log: &Log, recognised: Result<&Recognised, &SourceError>, prefix: &str) 
         other => (other.to_string(), 0),
     });
     let encoding = Encoding::of_profile(&log.index().profile);
-    let new = Topic::written(encoding, true).into_iter().map(|topic| topic.channel(prefix, encoding).topic);
+    let new = Topic::written(&Topic::FUSED, encoding, true)
+        .into_iter()
+        .map(|topic| topic.channel(prefix, encoding).topic);
     let new: Vec<String> = new.collect();
     let taken_topic = new.iter().find(|topic| log.index().channels_of(topic).next().is_some());
     let taken_topic = taken_topic.map(|t| format!("{t} is in the log already: `--prefix` names others"));

@@ -15,10 +15,12 @@ mod pose;
 mod residual;
 mod ros;
 mod scene;
+mod usbl_fix;
 
 pub(crate) use fields::{Stamp, Xyz};
 pub(crate) use payload::cdr;
 pub use point::track_messages;
+pub use usbl_fix::usbl_fix_messages;
 
 use event::event_message;
 use fields::drawn_in;
@@ -59,11 +61,15 @@ pub enum Topic {
     Fix,
     /// The track on a map, where the same is known.
     GeoJson,
+    /// What a causal method said at every instant.
+    Prediction,
+    /// USBL fixes with what became of them.
+    UsblFixes,
 }
 
 impl Topic {
-    /// All that there may be.
-    pub const ALL: [Self; 10] = [
+    /// Those of a fused track.
+    pub const FUSED: [Self; 10] = [
         Self::Track,
         Self::Pcf,
         Self::Events,
@@ -76,15 +82,28 @@ impl Topic {
         Self::GeoJson,
     ];
 
-    /// Those that there are in this encoding, of a track with or without a place on the earth.
+    /// Those of a dive seen by USBL.
+    pub const USBL: [Self; 9] = [
+        Self::Track,
+        Self::Prediction,
+        Self::UsblFixes,
+        Self::Scene,
+        Self::Pose,
+        Self::Log,
+        Self::Path,
+        Self::Fix,
+        Self::GeoJson,
+    ];
+
+    /// Those of `topics` that there are in this encoding, of a track with or without a place on the earth.
     #[must_use]
-    pub fn written(encoding: Encoding, has_place: bool) -> Vec<Self> {
+    pub fn written(topics: &[Self], encoding: Encoding, has_place: bool) -> Vec<Self> {
         let is_written = |topic: &Self| match topic {
             Self::Path => encoding == Encoding::Cdr,
             Self::Fix | Self::GeoJson => has_place,
             _ => true,
         };
-        Self::ALL.into_iter().filter(is_written).collect()
+        topics.iter().copied().filter(is_written).collect()
     }
 
     /// The channels of `topics` under `prefix`.
@@ -122,6 +141,8 @@ impl Topic {
                 ("events", schemas!("trackfuse.CharacteristicPoint", "trackfuse_msgs.CharacteristicPoint"))
             }
             Self::Residuals => ("residuals", schemas!("trackfuse.Residual", "trackfuse_msgs.Residual")),
+            Self::Prediction => ("prediction", schemas!("trackfuse.TrackPoint", "nav_msgs.Odometry")),
+            Self::UsblFixes => ("fixes", schemas!("trackfuse.UsblFix", "trackfuse_msgs.UsblFix")),
             Self::Scene => ("scene", schemas!("foxglove.SceneUpdate", "visualization_msgs.MarkerArray")),
             Self::Pose => ("pose", schemas!("foxglove.PoseInFrame", "geometry_msgs.PoseStamped")),
             Self::Log => ("log", schemas!("foxglove.Log", "rcl_interfaces.Log")),
@@ -185,12 +206,17 @@ impl Context<'_> {
     }
 }
 
-/// All new messages of the topics that are [`Topic::written`], in order of time, the pictures first; the summary stands at the track's first instant.
+/// Messages in order of time.
+pub type Stream<'a> = Box<dyn Iterator<Item = Published> + 'a>;
+
+/// All new messages of the topics that are [`Topic::written`], in order of time, the pictures first; the summary stands at
+/// the track's first instant. What an estimator has beside that comes in `more`, each in order of time.
 pub fn messages<'a>(
     fusion: &'a Fusion,
     context: Context<'a>,
     text: &str,
     warnings: &[String],
+    more: Vec<Stream<'a>>,
 ) -> impl Iterator<Item = Published> + 'a {
     let frame = fusion.track.frame_id.as_str();
     let start = fusion.track.points.first().map_or(context.t0, |p| p.time);
@@ -205,7 +231,7 @@ pub fn messages<'a>(
     let events = fusion.events.iter().filter_map(|e| event_message(e, frame, &context));
     let mut events: Vec<Published> = events.collect();
     events.sort_by_key(|e| e.time);
-    let streams: [Box<dyn Iterator<Item = Published> + 'a>; 6] = [
+    let streams: [Stream<'a>; 6] = [
         Box::new(track_messages(Topic::Track, &fusion.track, context)),
         Box::new(track_messages(Topic::Pcf, &fusion.plain_pcf, context)),
         Box::new(events.into_iter()),
@@ -213,7 +239,7 @@ pub fn messages<'a>(
         Box::new(pose_messages(&fusion.track, context)),
         Box::new(fix_messages(fusion, context)),
     ];
-    let mut streams = streams.map(Iterator::peekable);
+    let mut streams: Vec<_> = streams.into_iter().chain(more).map(Iterator::peekable).collect();
     head.chain(std::iter::from_fn(move || {
         let next = (0..streams.len()).filter_map(|i| Some((streams[i].peek()?.time, i))).min()?;
         streams[next.1].next()

@@ -10,6 +10,7 @@ mod proposal;
 mod registration;
 mod restore;
 mod text;
+mod usbl;
 
 pub use comparison::{
     ComparisonParts, ComparisonReport, Crossing, CrossingReport, PhaseErrors, ReferenceReport, WorstReport,
@@ -21,6 +22,10 @@ pub use proposal::InitReport;
 pub use registration::{NoiseReport, RegistrationReport, RejectedReport, UnknownReport};
 pub use restore::RestoreReport;
 pub use text::render;
+pub use usbl::{
+    DepthReport, ExchangesReport, FixesReport, PredictionReport, UsblParts, UsblReport, UsblTrackReport,
+    render_usbl,
+};
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -29,6 +34,7 @@ use crate::estimate::characteristic_point::CharacteristicPoint;
 use crate::estimate::coverage;
 use crate::estimate::extrapolation::LawKind;
 use crate::fusion::{Fusion, Plan, SplineSummary, TriedLaw};
+use crate::quality::PhaseSummary;
 use crate::sample::{Quantity, Source};
 use crate::source::{Candidate, Loaded};
 use crate::time::Time;
@@ -293,7 +299,6 @@ impl Report {
         } = *parts;
         let since_t0 = |s: f64| plan.origin.plus_seconds(s).seconds_since(t0);
         let span = |(a, b): (f64, f64)| (since_t0(a), since_t0(b));
-        let known = |sigma: f64| Some(sigma).filter(|s| s.is_finite());
         let name = |i: usize| sources[i].name.clone();
         let points = &fusion.track.points;
         let carried = fusion.phases.iter().find(|p| p.phase == Phase::Extrapolated);
@@ -322,21 +327,7 @@ impl Report {
                 span_s: (end(points.first()), end(points.last())),
                 pieces: fusion.pieces.len(),
             },
-            phases: fusion
-                .phases
-                .iter()
-                .map(|p| PhaseReport {
-                    phase: p.phase.name().into(),
-                    sources: (0..loaded.len()).filter(|i| p.seen_by >> i & 1 == 1).map(name).collect(),
-                    span_s: span(p.span_s),
-                    points: p.points,
-                    position_rmse_m: p.rmse[Quantity::Position as usize],
-                    velocity_rmse_m_s: p.rmse[Quantity::Velocity as usize],
-                    stretches: p.stretches,
-                    position_sigma_m: known(p.sigma[Quantity::Position as usize]),
-                    velocity_sigma_m_s: known(p.sigma[Quantity::Velocity as usize]),
-                })
-                .collect(),
+            phases: phases_of(fusion, sources, span),
             registration: fusion.registered.as_ref().map(|found| {
                 let sources: Vec<&Source> = sources.iter().collect();
                 RegistrationReport::new(found, &sources, since_t0)
@@ -367,6 +358,32 @@ impl Report {
             warnings: warnings.to_vec(),
         }
     }
+}
+
+/// A track phase by phase; `span` counts from T0.
+fn phases_of(
+    fusion: &Fusion,
+    sources: &[Source],
+    span: impl Fn((f64, f64)) -> (f64, f64),
+) -> Vec<PhaseReport> {
+    let known = |sigma: f64| Some(sigma).filter(|s| s.is_finite());
+    let report = |p: &PhaseSummary| PhaseReport {
+        phase: p.phase.name().into(),
+        sources: sources
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| p.seen_by >> i & 1 == 1)
+            .map(|(_, s)| s.name.clone())
+            .collect(),
+        span_s: span(p.span_s),
+        points: p.points,
+        position_rmse_m: p.rmse[Quantity::Position as usize],
+        velocity_rmse_m_s: p.rmse[Quantity::Velocity as usize],
+        stretches: p.stretches,
+        position_sigma_m: known(p.sigma[Quantity::Position as usize]),
+        velocity_sigma_m_s: known(p.sigma[Quantity::Velocity as usize]),
+    };
+    fusion.phases.iter().map(report).collect()
 }
 
 impl SplineReport {

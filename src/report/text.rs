@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Write};
 
-use super::{ExtrapolationReport, Report, registration};
+use super::{ExtrapolationReport, PhaseReport, Report, registration};
 use crate::printable::printable;
 
 /// The report as text. It doesn't name the files, which may change without the track changing.
@@ -34,13 +34,7 @@ fn write_page(out: &mut String, report: &Report) -> fmt::Result {
         write!(out, ", frame {:?}", track.frame_id)?;
     }
     writeln!(out)?;
-    if let Some([latitude, longitude, altitude]) = track.origin {
-        writeln!(
-            out,
-            "        metres east, north and up of latitude {latitude:.7}, longitude {longitude:.7} (WGS 84), altitude \
-             {altitude:.2} m"
-        )?;
-    }
+    origin(out, track.origin)?;
     if let Some(registration) = &report.registration {
         let what = if report.sources.len() > 1 { "registered to the datum" } else { "smoothed" };
         writeln!(out, "        {what} in {} steps, {} knots", registration.iterations, registration.knots)?;
@@ -61,16 +55,31 @@ fn write_page(out: &mut String, report: &Report) -> fmt::Result {
         registration::write(out, found)?;
         writeln!(out)?;
     }
-    phases(out, report)?;
+    phases(out, &report.phases)?;
     if !report.characteristic_points.is_empty() {
         writeln!(out)?;
         events(out, report)?;
     }
-    if !report.notes.is_empty() {
+    notes(out, &report.notes)?;
+    warnings(out, &report.warnings)
+}
+
+/// Where the zero of the coordinates is on the earth.
+pub(super) fn origin(out: &mut String, origin: Option<[f64; 3]>) -> fmt::Result {
+    let Some([latitude, longitude, altitude]) = origin else { return Ok(()) };
+    writeln!(
+        out,
+        "        metres east, north and up of latitude {latitude:.7}, longitude {longitude:.7} (WGS 84), altitude \
+         {altitude:.2} m"
+    )
+}
+
+/// The notes, a line each, behind an empty one.
+pub(super) fn notes(out: &mut String, notes: &[String]) -> fmt::Result {
+    if !notes.is_empty() {
         writeln!(out)?;
     }
-    report.notes.iter().try_for_each(|note| writeln!(out, "note: {}", printable(note)))?;
-    warnings(out, &report.warnings)
+    notes.iter().try_for_each(|note| writeln!(out, "note: {}", printable(note)))
 }
 
 /// The warnings, a line each, behind an empty one.
@@ -161,13 +170,13 @@ fn sources(out: &mut String, report: &Report) -> fmt::Result {
     Ok(())
 }
 
-fn phases(out: &mut String, report: &Report) -> fmt::Result {
+pub(super) fn phases(out: &mut String, phases: &[PhaseReport]) -> fmt::Result {
     writeln!(
         out,
         "{:<34} {:>17} {:>8}   {:<21} 1 sigma of the track",
         "phase", "from .. to s", "points", "rmse to the samples"
     )?;
-    for phase in &report.phases {
+    for phase in phases {
         let name = if phase.sources.is_empty() {
             phase.phase.clone()
         } else {

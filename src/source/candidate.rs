@@ -12,8 +12,8 @@ use crate::printable::printable;
 use crate::sample::Quantity;
 
 /// Schemas of an earlier run's results, known even where its metadata record is lost.
-const OWN_SCHEMAS: [&str; 3] =
-    ["trackfuse.TrackPoint", "trackfuse.CharacteristicPoint", "trackfuse.Residual"];
+const OWN_SCHEMAS: [&str; 4] =
+    ["trackfuse.TrackPoint", "trackfuse.CharacteristicPoint", "trackfuse.Residual", "trackfuse.UsblFix"];
 
 /// Where the usual messages keep a position, the most specific first.
 const POSITION_FIELDS: [&str; 6] =

@@ -178,6 +178,7 @@ impl Gathered {
         let offset_m = self.config.offset_m;
         let mut source = Source { name: self.config.name.clone(), ..Source::default() };
         let mut sigma = [None, None];
+        let late = late(&self.readings[Quantity::Position as usize]);
         for quantity in Quantity::ALL {
             let readings = std::mem::take(&mut self.readings[quantity as usize]);
             let value = |reading: &Reading| {
@@ -217,6 +218,7 @@ impl Gathered {
             frame_id: fix_origin.map_or(frame_id.unwrap_or_default(), |_| "enu".to_owned()),
             fix_origin,
             timing,
+            late,
             sigma,
             notes,
             warnings,
@@ -298,6 +300,20 @@ impl Fault {
             Self::Filtered => None,
         }
     }
+}
+
+/// Which of the readings, in order of time, came after one of a later time.
+fn late(readings: &[Reading]) -> Vec<usize> {
+    let mut newest = None;
+    let mut came_late = |time: Time| {
+        let late = newest.is_some_and(|newest| time < newest);
+        newest = newest.max(Some(time));
+        late
+    };
+    let mut order: Vec<(Time, bool)> = Vec::with_capacity(readings.len());
+    order.extend(readings.iter().map(|r| (r.time, came_late(r.time))));
+    order.sort_by_key(|(time, _)| *time);
+    order.iter().enumerate().filter(|(_, (_, late))| *late).map(|(i, _)| i).collect()
 }
 
 type Sigma = Option<(f64, SigmaOrigin)>;

@@ -63,6 +63,8 @@ pub struct Loaded {
     pub fix_origin: Option<[f64; 3]>,
     /// Its clock.
     pub timing: Timing,
+    /// The indices of positions that came after one of a later time.
+    pub late: Vec<usize>,
     /// Median standard deviation over axes and samples, m and m/s, and where it comes from.
     pub sigma: [Option<(f64, SigmaOrigin)>; 2],
     /// What is worth knowing of how it was read, a sentence each.

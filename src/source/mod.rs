@@ -14,7 +14,9 @@ mod propose;
 mod reading;
 mod recognise;
 mod recorded;
+mod scalar;
 mod topic;
+mod usbl;
 
 pub use candidate::{Candidate, Judged, Judgement, Unfit, judge};
 pub use events::{RecordedEvent, recorded_events};
@@ -23,14 +25,16 @@ pub use load::{Loaded, Samples, SigmaOrigin, Timing, datum, load};
 pub use propose::{Proposal, propose, propose_chosen};
 pub use recognise::{Choice, Recognised, choices_of, recognise};
 pub use recorded::{Recorded, recorded, reference};
+pub use scalar::{Scalar, load_scalar};
 pub use topic::is_datum_like;
+pub use usbl::usbl_fix;
 
 use std::path::Path;
 
 use crate::config::TimeChoice;
 use crate::log::LogError;
 use crate::log::decode::{DecodeError, PathError, PathMiss};
-use crate::printable::{printable, shell_word};
+use crate::printable::{printable, shell_word, toml_string};
 use crate::time::Time;
 
 /// Why there are no samples.
@@ -57,6 +61,28 @@ pub enum SourceError {
     Ambiguous {
         /// Between what.
         ambiguity: Box<Ambiguity>,
+    },
+    /// No topic, or several, of a USBL system.
+    #[error(
+        "{}{}",
+        if *several { "several topics look like a USBL system's fixes" } else { "no topic with a position has `usbl` in its name" },
+        listed(if *several { ": " } else { "; these would fit: " }, candidates)
+    )]
+    NoUsbl {
+        /// Whether there are several.
+        several: bool,
+        /// Those, or all topics that hold a position.
+        candidates: Vec<Candidate>,
+    },
+    /// A path leads to something that is no number.
+    #[error("source {name:?}: {} is no finite number in any of {count} messages", printable(path))]
+    NoNumber {
+        /// The source.
+        name: String,
+        /// The path.
+        path: String,
+        /// Number of messages.
+        count: usize,
     },
     /// A velocity in the body frame, with nothing to turn it by.
     #[error(
@@ -234,6 +260,11 @@ impl SourceError {
             }
             Self::Miss { miss: PathMiss::Field { field, available, .. }, .. } => {
                 format!("did you mean `{}`?", printable(nearest(field, available)?))
+            }
+            Self::NoUsbl { candidates, .. } => {
+                let path = candidates.iter().find_map(|c| c.position.clone());
+                let path = toml_string(&path.unwrap_or_else(|| "/topic.field".into()));
+                format!("`[usbl]` with `fix = {path}` in a config names the fixes: `--config`")
             }
             Self::NoOrientation { .. } => {
                 "`velocity_frame = \"world\"` in this source says that nothing need be turned".into()

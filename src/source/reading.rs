@@ -94,12 +94,52 @@ pub(super) enum Fault {
 pub(super) struct Reader {
     decoder: Decoder,
     vectors: Vec<Vector>,
-    stamps: Vec<MessagePath>,
+    timing: Timed,
     frames: Vec<MessagePath>,
-    time: Option<TimeChoice>,
     latency_s: f64,
     axes: Axes,
     offset_m: [f64; 3],
+}
+
+/// Where the messages of a topic keep their time.
+#[derive(Debug)]
+pub(super) struct Timed {
+    pub(super) stamps: Vec<MessagePath>,
+    choice: Option<TimeChoice>,
+}
+
+impl Timed {
+    pub(super) fn new(decoder: &Decoder, topic: &str, choice: Option<TimeChoice>) -> Self {
+        let fields: [&[&str]; 3] = [&["timestamp"], &["stamp"], &["header", "stamp"]];
+        let known = |path: &MessagePath| decoder.select(std::slice::from_ref(path)).is_ok();
+        Self { stamps: fields.map(|f| root(topic, f)).into_iter().filter(known).collect(), choice }
+    }
+
+    /// The stamp, else the publish time, else the log time, 0 counting as absent; or the one asked for.
+    pub(super) fn of(&self, value: &Value, message: &Message<'_>) -> Option<(Clock, Time)> {
+        let stamp = || {
+            let stamps = self.stamps.iter().filter_map(|p| p.resolve(value).ok().flatten()?.as_stamp());
+            let (sec, nsec) = stamps.into_iter().find(|&stamp| stamp != (0, 0))?;
+            Some((Clock::Stamp, Time::from_stamp(sec, nsec)?))
+        };
+        let publish = || {
+            let time = Some(message.publish_time).filter(|&t| t != 0)?;
+            Some((Clock::Publish, Time::from_log(time)?))
+        };
+        let log = || Some((Clock::Log, Time::from_log(message.log_time)?));
+        match self.choice {
+            None => stamp().or_else(publish).or_else(log),
+            Some(TimeChoice::Stamp) => stamp(),
+            Some(TimeChoice::Publish) => publish(),
+            Some(TimeChoice::Log) => log(),
+        }
+    }
+}
+
+/// The path of a field from a message's root.
+fn root(topic: &str, fields: &[&str]) -> MessagePath {
+    let steps = fields.iter().map(|f| Step::Field((*f).to_owned())).collect();
+    MessagePath { topic: topic.to_owned(), steps }
 }
 
 /// One vector that the messages hold.
@@ -129,14 +169,10 @@ impl Reader {
                 SourceError::Decode { name: config.name.clone(), topic: channel.topic.clone(), error }
             })?;
         let known = |path: &MessagePath| whole.select(std::slice::from_ref(path)).is_ok();
-        let root = |fields: &[&str]| MessagePath {
-            topic: channel.topic.clone(),
-            steps: fields.iter().map(|f| Step::Field((*f).to_owned())).collect(),
-        };
-        let stamps = [root(&["timestamp"]), root(&["stamp"]), root(&["header", "stamp"])];
+        let root = |fields: &[&str]| root(&channel.topic, fields);
+        let timing = Timed::new(&whole, &channel.topic, config.time);
         let frames = [root(&["frame_id"]), root(&["header", "frame_id"])];
-        let (stamps, frames): (Vec<_>, Vec<_>) =
-            (stamps.into_iter().filter(known).collect(), frames.into_iter().filter(known).collect());
+        let frames: Vec<_> = frames.into_iter().filter(known).collect();
 
         let by_type =
             if BODY_BY_TYPE.contains(&schema_name) { VelocityFrame::Body } else { VelocityFrame::World };
@@ -162,15 +198,14 @@ impl Reader {
         }
         let mut wanted: Vec<MessagePath> = vectors.iter().map(|v| v.path.clone()).collect();
         wanted.extend(vectors.iter().flat_map(|v| v.covariances.iter().chain(&v.orientations)).cloned());
-        wanted.extend(stamps.iter().chain(&frames).cloned());
+        wanted.extend(timing.stamps.iter().chain(&frames).cloned());
         let decoder =
             whole.select(&wanted).map_err(|miss| SourceError::Miss { name: config.name.clone(), miss })?;
         Ok(Self {
             decoder,
             vectors,
-            stamps,
+            timing,
             frames,
-            time: config.time,
             latency_s: config.latency_s,
             axes: config.axes,
             offset_m: config.offset_m,
@@ -180,7 +215,7 @@ impl Reader {
     /// Reads one message; `None` where its time lies past the year 2262.
     pub(super) fn read(&self, message: &Message<'_>) -> Result<Option<Outcome>, DecodeError> {
         let value = self.decoder.decode(message.data)?;
-        let Some((clock, time)) = self.time_of(&value, message) else { return Ok(None) };
+        let Some((clock, time)) = self.timing.of(&value, message) else { return Ok(None) };
         let delay_s = Time::from_log(message.log_time).map_or(0.0, |log| log.seconds_since(time));
         let time = time.plus_seconds(-self.latency_s);
         let vectors = self.vectors.iter().map(|v| (v.quantity, self.vector(v, &value, time))).collect();
@@ -190,26 +225,6 @@ impl Reader {
             _ => None,
         };
         Ok(Some(Outcome { clock, delay_s, frame_id, vectors }))
-    }
-
-    /// The stamp, else the publish time, else the log time, 0 counting as absent; or the one asked for.
-    fn time_of(&self, value: &Value, message: &Message<'_>) -> Option<(Clock, Time)> {
-        let stamp = || {
-            let stamps = self.stamps.iter().filter_map(|p| p.resolve(value).ok().flatten()?.as_stamp());
-            let (sec, nsec) = stamps.into_iter().find(|&stamp| stamp != (0, 0))?;
-            Some((Clock::Stamp, Time::from_stamp(sec, nsec)?))
-        };
-        let publish = || {
-            let time = Some(message.publish_time).filter(|&t| t != 0)?;
-            Some((Clock::Publish, Time::from_log(time)?))
-        };
-        let log = || Some((Clock::Log, Time::from_log(message.log_time)?));
-        match self.time {
-            None => stamp().or_else(publish).or_else(log),
-            Some(TimeChoice::Stamp) => stamp(),
-            Some(TimeChoice::Publish) => publish(),
-            Some(TimeChoice::Log) => log(),
-        }
     }
 
     fn vector(&self, vector: &Vector, message: &Value, time: Time) -> Result<Reading, Fault> {

@@ -151,7 +151,12 @@ impl Output {
             let topic = &message.channel.topic;
             let value = if message.channel.message_encoding == "json" {
                 serde_json::from_slice(&message.data).unwrap_or_default()
-            } else if let Some(s) = message.channel.schema.clone().filter(|_| topic.starts_with("/fused/")) {
+            } else if let Some(s) = message
+                .channel
+                .schema
+                .clone()
+                .filter(|_| ["/fused/", "/usbl/"].iter().any(|own| topic.starts_with(own)))
+            {
                 let encoding = &message.channel.message_encoding;
                 let decoder = Decoder::new(encoding, &s.encoding, &s.name, &s.data).unwrap();
                 decoder.decode(&message.data).unwrap().to_json()

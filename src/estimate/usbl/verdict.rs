@@ -122,3 +122,15 @@ pub enum Warning {
         scale: f64,
     },
 }
+
+impl Warning {
+    /// The same with its times `by_s` later.
+    #[must_use]
+    pub fn later(mut self, by_s: f64) -> Self {
+        if let Self::WildStretch { from_s, to_s, .. } | Self::Ambiguous { from_s, to_s, .. } = &mut self {
+            *from_s += by_s;
+            *to_s += by_s;
+        }
+        self
+    }
+}

@@ -19,6 +19,7 @@ use super::map::FixMessage;
 use super::point::PointMessage;
 use super::pose::PoseMessage;
 use super::residual::ResidualMessage;
+use super::usbl_fix::UsblFixMessage;
 use super::{Published, Topic};
 use crate::math::polyline::{Rank, Vertex, thin};
 use crate::time::Time;
@@ -262,6 +263,36 @@ impl From<ResidualMessage> for Residual {
             velocity_residual: if_known(residual.velocity_residual),
             velocity_normalised: residual.velocity_normalised.into_iter().collect(),
             phase: residual.phase,
+        }
+    }
+}
+
+/// `trackfuse_msgs/UsblFix`.
+#[derive(Serialize)]
+pub(super) struct UsblFix {
+    header: Header,
+    position: [f64; 3],
+    position_sigma: Vec<[f64; 3]>,
+    verdict: String,
+    reason: String,
+    late: bool,
+    exchange: u32,
+    position_residual: Vec<[f64; 3]>,
+    position_normalised: Vec<f64>,
+}
+
+impl From<UsblFixMessage> for UsblFix {
+    fn from(fix: UsblFixMessage) -> Self {
+        Self {
+            header: Header::new(fix.timestamp, fix.frame_id),
+            position: fix.position.unwrap_or_default().into(),
+            position_sigma: if_known(fix.position_sigma),
+            verdict: fix.verdict,
+            reason: fix.reason,
+            late: fix.late,
+            exchange: fix.exchange,
+            position_residual: if_known(fix.position_residual),
+            position_normalised: fix.position_normalised.into_iter().collect(),
         }
     }
 }

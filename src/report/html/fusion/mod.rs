@@ -1,18 +1,16 @@
 //! The page of `fuse`: what was done, then what it rests on.
 
 mod answer;
-mod drawing;
 mod overlap;
 mod residuals;
-mod tables;
+pub(super) mod tables;
 
+use super::drawing::{Drawing, Drawn};
 use super::{Page, Part, Section};
 use crate::fusion::Fusion;
 use crate::report::Report;
-use crate::sample::Source;
+use crate::sample::{Quantity, Sample, Source};
 use crate::time::Time;
-
-use drawing::Drawing;
 
 /// What the page is made of.
 #[derive(Clone, Copy, Debug)]
@@ -30,9 +28,18 @@ pub struct Parts<'a> {
 }
 
 impl Parts<'_> {
-    /// Seconds since T0 of seconds since the origin.
-    fn since_t0(&self, time_s: f64) -> f64 {
-        time_s + self.origin.seconds_since(self.t0)
+    /// What the registration found to be outliers, in order of time.
+    fn rejected(&self, quantity: Quantity) -> Vec<Sample> {
+        let found = self.fusion.registered.iter().flat_map(|found| &found.rejected);
+        let mut rejected: Vec<Sample> = found
+            .filter(|r| r.quantity == quantity)
+            .filter_map(|r| {
+                let series = self.sources[r.source].series(quantity);
+                series.get(series.partition_point(|s| s.time_s < r.time_s)).copied()
+            })
+            .collect();
+        rejected.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+        rejected
     }
 }
 
@@ -40,17 +47,21 @@ impl Parts<'_> {
 #[must_use]
 pub fn page(parts: Parts<'_>, provenance: &[(String, String)], config: &str) -> Page {
     let report = parts.report;
-    let mut drawing = Drawing::new(parts);
+    let Parts { fusion, sources, origin, t0, .. } = parts;
+    let [positions, velocities] = Quantity::ALL.map(|quantity| parts.rejected(quantity));
+    let rejected = [&positions[..], &velocities];
+    let mut drawing =
+        Drawing::new(Drawn { fusion, sources, rejected, rate_hz: report.track.rate_hz, origin, t0 });
     let sections = vec![
         section("space", "Track in space", drawing.in_space()),
         section("motion", "Position, velocity, acceleration", {
             let mut shown = drawing.motion();
-            shown.extend([tables::phases(report), tables::sources(report)].map(Part::Table));
+            shown.extend([tables::phases(&report.phases), tables::sources(&report.sources)].map(Part::Table));
             shown.extend(tables::remarks(report).into_iter().map(Part::Text));
             shown
         }),
-        section("overlap", "Overlap of the sources", overlap::parts(&mut drawing)),
-        section("residuals", "Residuals", residuals::parts(&mut drawing)),
+        section("overlap", "Overlap of the sources", overlap::parts(&mut drawing, report)),
+        section("residuals", "Residuals", residuals::parts(&mut drawing, report)),
         section("errors", "Estimated errors", tables::errors(report)),
         section("points", "Characteristic points", vec![tables::characteristic_points(report)]),
         section("extrapolation", "Hold-out of the extrapolation", tables::holdout(report)),
@@ -68,11 +79,11 @@ pub fn page(parts: Parts<'_>, provenance: &[(String, String)], config: &str) -> 
     }
 }
 
-fn section(id: &'static str, title: &'static str, parts: Vec<Part>) -> Section {
+pub(super) fn section(id: &'static str, title: &'static str, parts: Vec<Part>) -> Section {
     Section { id, title, parts }
 }
 
 /// The last part of a path, whatever system it is of.
-fn file_name(path: &str) -> &str {
+pub(super) fn file_name(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }

@@ -1,9 +1,10 @@
 //! Where sources overlap: how they differ before and after the registration.
 
-use super::drawing::{AXES, Drawing};
+use super::super::drawing::{AXES, Drawing};
 use crate::estimate::agreement::{self, Disagreement};
 use crate::estimate::coverage::Coverage;
 use crate::quality::Residual;
+use crate::report::Report;
 use crate::report::html::{Column, Ink, Level, Part, Plot, Series, Table, plus_minus};
 use crate::sample::{Quantity, Sample, slice};
 use crate::time::Time;
@@ -16,7 +17,7 @@ const ROWS: usize = 8000;
 const MARGIN: f64 = 0.1;
 
 /// Text, medians and plots.
-pub(super) fn parts(drawing: &mut Drawing<'_>) -> Vec<Part> {
+pub(super) fn parts(drawing: &mut Drawing<'_>, report: &Report) -> Vec<Part> {
     let p = drawing.parts;
     let overlaps = p.fusion.phases.iter().filter(|s| s.phase == Phase::Overlap).map(|s| s.span_s);
     let Some((from_s, to_s)) = overlaps.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))) else {
@@ -33,7 +34,7 @@ pub(super) fn parts(drawing: &mut Drawing<'_>) -> Vec<Part> {
     } else {
         "How far the sources' samples lie from the track, as they were read: they were not registered to each other."
     };
-    let mut parts = vec![Part::Text(text.into()), Part::Table(medians(drawing))];
+    let mut parts = vec![Part::Text(text.into()), Part::Table(medians(drawing, report))];
     for quantity in Quantity::ALL {
         let mut stages = vec![before(drawing, quantity, (from_s, to_s))];
         if registered {
@@ -146,7 +147,7 @@ fn plots(quantity: Quantity, stages: &[Stage], range: (f64, f64)) -> Vec<Plot> {
 }
 
 /// Median differences before, and those of the report, which are after where there was a registration.
-fn medians(drawing: &Drawing<'_>) -> Table {
+fn medians(drawing: &Drawing<'_>, report: &Report) -> Table {
     let p = drawing.parts;
     let mut rows = Vec::new();
     let words = |significant: bool| if significant { "more than noise" } else { "noise" };
@@ -165,7 +166,7 @@ fn medians(drawing: &Drawing<'_>) -> Table {
         }
     }
     let when = if p.fusion.registered.is_some() { "after" } else { "–" };
-    for d in &p.report.disagreements {
+    for d in &report.disagreements {
         let names = [d.second.clone(), d.first.clone()];
         rows.push(row(when, &names, &d.quantity, (d.median, d.sigma), d.count, words(d.significant)));
     }

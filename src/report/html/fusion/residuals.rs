@@ -1,9 +1,10 @@
 //! What is left of the samples: over time, and how alike successive ones are.
 
-use super::drawing::{AXES, Drawing};
+use super::super::drawing::{AXES, Drawing};
 use super::overlap::misfits;
 use crate::math::autocorrelation::autocorrelation;
 use crate::quality::BAND_SIGMAS;
+use crate::report::Report;
 use crate::report::html::{Columns, Ink, Level, Part, Plot, Series, Style};
 use crate::sample::{Quantity, Sample};
 
@@ -14,7 +15,7 @@ const ROWS: usize = 8000;
 const LAGS: usize = 40;
 
 /// Two plots a source and quantity, side by side.
-pub(super) fn parts(drawing: &mut Drawing<'_>) -> Vec<Part> {
+pub(super) fn parts(drawing: &mut Drawing<'_>, report: &Report) -> Vec<Part> {
     let p = drawing.parts;
     let text = "Left: how far each sample lies from the track, its source's estimated errors taken off; dashed are ± 1.96 sigmas \
                 of the noise, which hold 95 % of the samples where the sigmas are right. Right: the autocorrelation, by \
@@ -31,7 +32,7 @@ pub(super) fn parts(drawing: &mut Drawing<'_>) -> Vec<Part> {
                 x_label: "s since T0",
                 y_label: quantity.unit().into(),
                 series: (0..3).map(|axis| Drawing::dots(AXES[axis], table, axis, Ink::Axis(axis))).collect(),
-                levels: about_zero(sigma(drawing, i, quantity)),
+                levels: about_zero(sigma(drawing, report, i, quantity)),
                 range: None,
                 y_range: None,
                 group: "residuals",
@@ -43,8 +44,8 @@ pub(super) fn parts(drawing: &mut Drawing<'_>) -> Vec<Part> {
 }
 
 /// The noise as it was found to be, where it was stated or estimated.
-fn sigma(drawing: &Drawing<'_>, source: usize, quantity: Quantity) -> Option<f64> {
-    let stated = drawing.parts.report.sources.get(source)?;
+fn sigma(drawing: &Drawing<'_>, report: &Report, source: usize, quantity: Quantity) -> Option<f64> {
+    let stated = report.sources.get(source)?;
     let stated = match quantity {
         Quantity::Position => stated.position_sigma_m,
         Quantity::Velocity => stated.velocity_sigma_m_s,

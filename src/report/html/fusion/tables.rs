@@ -3,11 +3,11 @@
 use crate::report::html::table::NONE;
 use crate::report::html::{Column, Part, Table, plus_minus, value};
 use crate::report::text::short;
-use crate::report::{LawReport, Report, UnknownReport};
+use crate::report::{LawReport, PhaseReport, Report, SourceReport, UnknownReport};
 
 /// The track phase by phase.
-pub(super) fn phases(report: &Report) -> Table {
-    let rows = report.phases.iter().map(|p| {
+pub(in super::super) fn phases(phases: &[PhaseReport]) -> Table {
+    let rows = phases.iter().map(|p| {
         let name =
             if p.stretches > 1 { format!("{} ({} parts)", p.phase, p.stretches) } else { p.phase.clone() };
         vec![
@@ -42,8 +42,8 @@ fn span(span_s: Option<(f64, f64)>) -> String {
 }
 
 /// The sources.
-pub(super) fn sources(report: &Report) -> Table {
-    let rows = report.sources.iter().map(|s| {
+pub(in super::super) fn sources(sources: &[SourceReport]) -> Table {
+    let rows = sources.iter().map(|s| {
         let sigma = |sigma: Option<f64>, from: &Option<String>| {
             from.as_ref().map_or(value(sigma, 3), |from| format!("{} ({from})", value(sigma, 3)))
         };

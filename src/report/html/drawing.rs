@@ -1,10 +1,11 @@
 //! The track and the sources' samples as plots over time and in space.
 
-use super::Parts;
+use super::data::thin;
+use super::{Band, Columns, Ink, Mark, Part, Plot, Series, Space, Style};
+use crate::fusion::Fusion;
 use crate::quality::BAND_SIGMAS;
-use crate::report::html::data::thin;
-use crate::report::html::{Band, Columns, Ink, Mark, Part, Plot, Series, Space, Style};
-use crate::sample::{Quantity, Sample};
+use crate::sample::{Quantity, Sample, Source};
+use crate::time::Time;
 use crate::track::{Phase, State, TrackPoint};
 
 pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
@@ -25,9 +26,33 @@ const PHASE: usize = 16;
 /// Characteristic points in the view of space, the first ones: more can't be told apart.
 const MARKS: usize = 40;
 
+/// What there is to draw.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Drawn<'a> {
+    /// The track.
+    pub(super) fusion: &'a Fusion,
+    /// The sources as they were read, in the order of their bits.
+    pub(super) sources: &'a [Source],
+    /// What of them was rejected, in order of time: positions, velocities.
+    pub(super) rejected: [&'a [Sample]; 2],
+    /// Points of the track a second.
+    pub(super) rate_hz: f64,
+    /// The instant that samples count from.
+    pub(super) origin: Time,
+    /// T0, from which the page's times count.
+    pub(super) t0: Time,
+}
+
+impl Drawn<'_> {
+    /// Seconds since T0 of seconds since the origin.
+    pub(super) fn since_t0(&self, time_s: f64) -> f64 {
+        time_s + self.origin.seconds_since(self.t0)
+    }
+}
+
 /// What the plots draw, as it is gathered.
 pub(super) struct Drawing<'a> {
-    pub(super) parts: Parts<'a>,
+    pub(super) parts: Drawn<'a>,
     tables: Vec<Columns>,
     track: usize,
     /// By source and quantity.
@@ -36,7 +61,7 @@ pub(super) struct Drawing<'a> {
 }
 
 impl<'a> Drawing<'a> {
-    pub(super) fn new(parts: Parts<'a>) -> Self {
+    pub(super) fn new(parts: Drawn<'a>) -> Self {
         let mut drawing =
             Self { parts, tables: Vec::new(), track: 0, samples: Vec::new(), rejected: [None; 2] };
         drawing.track = drawing.add_track();
@@ -44,18 +69,7 @@ impl<'a> Drawing<'a> {
             let tables = Quantity::ALL.map(|q| drawing.add_samples(source.series(q), SAMPLE_ROWS));
             drawing.samples.push(tables);
         }
-        drawing.rejected = Quantity::ALL.map(|q| {
-            let found = parts.fusion.registered.as_ref()?;
-            let of_quantity = found.rejected.iter().filter(|r| r.quantity == q);
-            let mut rejected: Vec<Sample> = of_quantity
-                .filter_map(|r| {
-                    let series = parts.sources[r.source].series(q);
-                    series.get(series.partition_point(|s| s.time_s < r.time_s)).copied()
-                })
-                .collect();
-            rejected.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
-            drawing.add_samples(&rejected, SAMPLE_ROWS)
-        });
+        drawing.rejected = parts.rejected.map(|rejected| drawing.add_samples(rejected, SAMPLE_ROWS));
         drawing
     }
 
@@ -102,7 +116,7 @@ impl<'a> Drawing<'a> {
         let moving = [p(0), p(1), p(2), v(0), v(1), v(2)];
         let moving: Vec<&dyn Fn(usize) -> f64> = moving.iter().map(|f| f as &dyn Fn(usize) -> f64).collect();
         let kept = thin(points.len(), &moving, TRACK_ROWS - TRACK_ROWS / 4);
-        let rows = with_borders(points, kept, 1.5 / self.parts.report.track.rate_hz);
+        let rows = with_borders(points, kept, 1.5 / self.parts.rate_hz);
         let (a, ps, vs) = ([a(0), a(1), a(2)], [ps(0), ps(1), ps(2)], [vs(0), vs(1), vs(2)]);
         let mut columns: Vec<&dyn Fn(usize) -> f64> = vec![&time];
         columns.extend(moving);
@@ -175,7 +189,7 @@ impl<'a> Drawing<'a> {
 
     /// The view of space, and what stands above it.
     pub(super) fn in_space(&self) -> Vec<Part> {
-        let Parts { report, fusion, sources, .. } = self.parts;
+        let Drawn { fusion, sources, .. } = self.parts;
         let half_axes = |sigma: [f64; 3]| {
             Some(sigma.map(|s| BAND_SIGMAS * s)).filter(|h| h.iter().all(|v| v.is_finite()))
         };
@@ -187,7 +201,7 @@ impl<'a> Drawing<'a> {
         };
         let events = fusion.events.iter().take(MARKS).map(|e| mark(&e.name, &e.state, e.phase));
         let end = fusion.track.points.last().map(|p| mark("", &p.state, p.phase));
-        let frame = match report.track.frame_id.as_str() {
+        let frame = match fusion.track.frame_id.as_str() {
             "" => "a frame that the log doesn't name".to_owned(),
             frame => format!("frame {frame:?}"),
         };

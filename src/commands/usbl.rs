@@ -1,0 +1,182 @@
+//! `trackfuse usbl`: log -> fixes -> track, prediction and verdicts -> log.
+
+use super::progress::Bar;
+use super::{CommandError, Outcome, addition, html_report, say};
+use crate::cli::Addition;
+use crate::config::{Config, SourceConfig};
+use crate::estimate::usbl::{Height, Warning};
+use crate::fusion;
+use crate::log::{Appender, Encoding, Log, LogError, bad_chunks};
+use crate::math::geodesy::{Geodetic, LocalFrame};
+use crate::publish::{Context, Topic, messages, track_messages, usbl_fix_messages};
+use crate::report::{UsblParts, UsblReport, html, render_usbl};
+use crate::resolve;
+use crate::sample::Source;
+use crate::source::{self, Loaded, Samples, SigmaOrigin};
+use crate::time::Time;
+
+/// What the fixes are called.
+const NAME: &str = "usbl";
+
+/// Cleans a USBL system's fixes and writes the track, a prediction and every fix's verdict beside them.
+///
+/// # Errors
+/// [`CommandError`], and then nothing is written.
+pub fn usbl(args: &Addition) -> Result<Outcome, CommandError> {
+    let mut config = addition::config(args, "/usbl")?;
+    let bar = Bar::new(args.voice);
+    let (log, mut warnings) = addition::open(args, &bar)?;
+    let destination = addition::destination(args, "usbl");
+    let usual = Encoding::of_profile(&log.index().profile);
+    let encoding = *config.output.encoding.get_or_insert(usual);
+    let all = Topic::channels(&Topic::written(&Topic::USBL, encoding, true), &config.output.prefix, encoding);
+    Appender::check(&log, &destination, &all)?;
+    html_report::check(args, &log, &destination)?;
+
+    let mut damaged = choose_fixes(&log, &mut config)?;
+    let asked = [source_of(&config)];
+    let Samples { mut loaded, origin, left_out, read } =
+        source::load(&log, &asked, true, config.output.origin)?;
+    damaged.extend(read.damaged);
+    let (mut loaded, fixes) = only(&mut loaded)?;
+    let heights = heights(&log, &config, origin, &mut damaged, &mut warnings)?;
+    addition::ensure_whole(&mut damaged, &log, args)?;
+    warnings.extend(left_out.into_iter().filter(|sentence| !warnings.contains(sentence)).collect::<Vec<_>>());
+    let fixes = at_sea_level(fixes, &mut loaded, &mut config);
+    let geodetic = config.output.origin.map(|place| LocalFrame::new(Geodetic::from_degrees(place)));
+    bar.doing("cleaning");
+    let plan = resolve::dive_plan(&mut config, &loaded, &fixes, origin)?;
+    let dive = fusion::usbl::clean(&fixes, &loaded.late, &heights, &plan)?;
+    addition::check_finite(&dive.fusion.track)?;
+    config.usbl.cycle_s = Some(dive.cycle_s);
+
+    let first = dive.fusion.track.points.first().map_or(origin, |p| p.time);
+    let t0 = config.output.t0_ns.map_or(first, Time::from_ns);
+    config.output.t0_ns = Some(t0.ns());
+    let shift_s = resolve::log_time_shift_s(&loaded);
+    warnings.extend(resolve::warnings_of(std::slice::from_ref(&loaded), shift_s));
+    let stated =
+        loaded.sigma[0].is_some_and(|(_, from)| matches!(from, SigmaOrigin::Config | SigmaOrigin::Messages));
+    let told = dive.cleaned.warnings.iter().filter(|w| stated || !matches!(w, Warning::Noise { .. }));
+    warnings.extend(told.map(|w| w.clone().later(origin.seconds_since(t0)).to_string()));
+    let (input_name, output_name) =
+        (args.log.display().to_string(), destination.path(&log).display().to_string());
+    let of_fixes = loaded.notes.iter().cloned();
+    let notes: Vec<String> = of_fixes.chain(log.visibility().note()).chain(encoding.note(usual)).collect();
+    let report = UsblReport::new(&UsblParts {
+        input: &input_name,
+        output: &output_name,
+        t0,
+        origin: config.output.origin,
+        loaded: &loaded,
+        fixes: &fixes,
+        depth: config.usbl.depth.as_deref().map(|path| (path, heights.len())),
+        plan: &plan,
+        dive: &dive,
+        notes: &notes,
+        warnings: &warnings,
+    });
+    let text = render_usbl(&report);
+
+    let topics = Topic::written(&Topic::USBL, encoding, geodetic.is_some());
+    let channels = Topic::channels(&topics, &config.output.prefix, encoding);
+    let kept = std::slice::from_ref(&dive.kept);
+    let context = Context {
+        sources: kept,
+        origin,
+        rate_hz: plan.rate_hz,
+        t0,
+        surface_at_zero: config.output.surface_at_zero == Some(true),
+        log_start: resolve::log_start(&log, shift_s),
+        encoding,
+        geodetic,
+    };
+    let metadata = addition::metadata(&log, &config, "usbl", &report)?;
+    let parts = html::usbl::Parts { report: &report, dive: &dive, fixes: &fixes.positions, origin, t0 };
+    let page = html_report::prepare(args, &metadata, |provenance, config| {
+        html::usbl::page(parts, provenance, config)
+    })?;
+    let mut appender = Appender::begin(&log, &destination, &channels, config.output.compression)?;
+    appender.leave_out(bad_chunks(&damaged));
+    bar.doing("writing the track");
+    let judged = usbl_fix_messages(&fixes.positions, &dive.cleaned.judged, &plan.frame_id, context);
+    let prediction = track_messages(Topic::Prediction, &dive.prediction, context);
+    let more: Vec<crate::publish::Stream<'_>> = vec![Box::new(prediction), Box::new(judged)];
+    let messages = messages(&dive.fusion, context, &text, &warnings, more);
+    addition::write(&mut appender, messages, &topics, shift_s)?;
+    appender.add_metadata(metadata);
+    appender.finish()?;
+    html_report::publish(page, &output_name)?;
+    drop(bar);
+    let text = format!("{}\n\n{text}", addition::files(args, &input_name, &output_name));
+    say(args.voice, &text, &report, &warnings);
+    Ok(if warnings.is_empty() { Outcome::Done } else { Outcome::Warned })
+}
+
+/// Fills in the fixes' path where the config names none, and returns what could not be read on the way.
+fn choose_fixes(log: &Log, config: &mut Config) -> Result<Vec<LogError>, CommandError> {
+    if config.usbl.fix.is_some() {
+        return Ok(Vec::new());
+    }
+    let (path, damaged) = source::usbl_fix(log, &config.output.prefix)?;
+    config.usbl.fix = Some(path);
+    Ok(damaged)
+}
+
+/// The fixes as any source is configured.
+fn source_of(config: &Config) -> SourceConfig {
+    let usbl = &config.usbl;
+    SourceConfig {
+        name: NAME.into(),
+        position: usbl.fix.clone(),
+        axes: usbl.axes,
+        time: usbl.time,
+        latency_s: usbl.latency_s,
+        position_sigma_m: usbl.sigma_m,
+        datum: true,
+        ..SourceConfig::default()
+    }
+}
+
+/// The one source that was loaded, and its samples.
+fn only(loaded: &mut Vec<Loaded>) -> Result<(Loaded, Source), CommandError> {
+    let nothing = source::SourceError::Empty { name: NAME.into(), topic: NAME.into() };
+    let mut loaded = loaded.pop().ok_or(nothing)?;
+    let fixes = std::mem::take(&mut loaded.source);
+    Ok((loaded, fixes))
+}
+
+/// The depth channel's heights, where one is named.
+fn heights(
+    log: &Log,
+    config: &Config,
+    origin: Time,
+    damaged: &mut Vec<LogError>,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Height>, CommandError> {
+    let Some(path) = &config.usbl.depth else { return Ok(Vec::new()) };
+    let depth = source::load_scalar(log, "depth", path, None)?;
+    damaged.extend(depth.damaged);
+    if depth.left_out > 0 {
+        warnings
+            .push(format!("depth: {} messages are left out: no finite number at the path", depth.left_out));
+    }
+    let height = |&(time, depth_m): &(Time, f64)| Height {
+        time_s: time.seconds_since(origin),
+        z_m: -depth_m,
+        sigma_m: config.usbl.depth_sigma_m,
+    };
+    Ok(depth.values.iter().map(height).collect())
+}
+
+/// Latitudes and longitudes count from altitude 0, unless the config says otherwise: z = 0 is then the surface.
+fn at_sea_level(mut fixes: Source, loaded: &mut Loaded, config: &mut Config) -> Source {
+    let (None, Some([latitude, longitude, altitude_m])) = (config.output.origin, loaded.fix_origin) else {
+        return fixes;
+    };
+    // an origin straight below has the same axes
+    fixes.positions.iter_mut().for_each(|fix| fix.value[2] += altitude_m);
+    let origin = [latitude, longitude, 0.0];
+    (config.output.origin, loaded.fix_origin) = (Some(origin), Some(origin));
+    fixes
+}

@@ -1,0 +1,271 @@
+//! What is to be said of a dive seen by USBL.
+
+use std::fmt::{self, Write};
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::text::{self, short};
+use super::{PhaseReport, SourceReport, phases_of};
+use crate::estimate::usbl::{Judged, Reason, Verdict};
+use crate::fusion::usbl::{Dive, DivePlan};
+use crate::printable::printable;
+use crate::sample::Source;
+use crate::source::Loaded;
+use crate::time::Time;
+
+/// The report of `usbl`. Nanoseconds are strings, since JSON numbers lose them.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct UsblReport {
+    /// Version of the program.
+    pub version: String,
+    /// The log that was read.
+    pub input: String,
+    /// The log that was written.
+    pub output: String,
+    /// T0, from which all `_s` times below count, ns since the epoch of the fixes' clock.
+    pub t0_ns: String,
+    /// The fixes as they were read.
+    pub source: SourceReport,
+    /// What became of them.
+    pub fixes: FixesReport,
+    /// The acoustic exchanges that they came with.
+    pub exchanges: ExchangesReport,
+    /// The depth channel, where one was named.
+    pub depth: Option<DepthReport>,
+    /// The track.
+    pub track: UsblTrackReport,
+    /// The track phase by phase.
+    pub phases: Vec<PhaseReport>,
+    /// The causal method's prediction.
+    pub prediction: PredictionReport,
+    /// What is good to know of the output, and harms nothing.
+    pub notes: Vec<String>,
+    /// What a person must read.
+    pub warnings: Vec<String>,
+}
+
+/// What became of the fixes: numbers of them.
+#[derive(Clone, Debug, Default, Serialize, JsonSchema)]
+pub struct FixesReport {
+    /// The track rests on them.
+    pub kept: usize,
+    /// Thrown out: off, unlike others of their exchange.
+    pub off_by_itself: usize,
+    /// Thrown out with their whole exchange.
+    pub off_as_cycle: usize,
+    /// Thrown out: not at the depth sensor's depth.
+    pub off_depth: usize,
+    /// Thrown out: they repeat another one.
+    pub repeated: usize,
+    /// Those of all these that came after a fix of a later time.
+    pub late: usize,
+}
+
+/// The acoustic exchanges.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct ExchangesReport {
+    /// How many there are.
+    pub count: usize,
+    /// How many of them were thrown out as a whole.
+    pub thrown_out: usize,
+    /// Time from one to the next, s.
+    pub cycle_s: f64,
+}
+
+/// The depth channel.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct DepthReport {
+    /// Its message path.
+    pub path: String,
+    /// How many depths it gave.
+    pub samples: usize,
+}
+
+/// The smoothed track.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct UsblTrackReport {
+    /// Frame of the coordinates.
+    pub frame_id: String,
+    /// Latitude and longitude, degrees, and altitude, m, of the zero of the coordinates (WGS 84), where they are known.
+    pub origin: Option<[f64; 3]>,
+    /// Number of points.
+    pub points: usize,
+    /// Points a second.
+    pub rate_hz: f64,
+    /// First and last point, s since T0.
+    pub span_s: (f64, f64),
+    /// Standard deviation of the noise over what was stated: horizontal, vertical.
+    pub noise_scale: [f64; 2],
+    /// Density of the vehicle's acceleration, m^2/s^3: horizontal, vertical.
+    pub acceleration_density: [f64; 2],
+}
+
+/// The causal method's prediction.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct PredictionReport {
+    /// The method.
+    pub method: String,
+    /// Number of points.
+    pub points: usize,
+    /// Root mean square 3-D distance from the track while fixes come, m.
+    pub rmse_m: Option<f64>,
+    /// The same in silence, m.
+    pub silent_rmse_m: Option<f64>,
+}
+
+/// What a report is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct UsblParts<'a> {
+    /// The log that was read.
+    pub input: &'a str,
+    /// The log that is written.
+    pub output: &'a str,
+    /// T0.
+    pub t0: Time,
+    /// Latitude and longitude, degrees, and altitude, m, of the track's zero.
+    pub origin: Option<[f64; 3]>,
+    /// How the fixes were read.
+    pub loaded: &'a Loaded,
+    /// The fixes.
+    pub fixes: &'a Source,
+    /// The depth channel's path, and how many depths it gave.
+    pub depth: Option<(&'a str, usize)>,
+    /// What was to be done.
+    pub plan: &'a DivePlan,
+    /// What came of it.
+    pub dive: &'a Dive,
+    /// What is good to know of the output.
+    pub notes: &'a [String],
+    /// All that a person must read.
+    pub warnings: &'a [String],
+}
+
+impl FixesReport {
+    fn of(judged: &[Judged]) -> Self {
+        let count = |wanted: &dyn Fn(&Judged) -> bool| judged.iter().filter(|j| wanted(j)).count();
+        let because = |reason| count(&|j| j.reason == reason);
+        Self {
+            kept: count(&|j| j.verdict == Verdict::Kept),
+            off_by_itself: because(Reason::OffByItself),
+            off_as_cycle: because(Reason::OffAsCycle),
+            off_depth: because(Reason::OffDepth),
+            repeated: because(Reason::Repeated),
+            late: count(&|j| j.late),
+        }
+    }
+}
+
+impl UsblReport {
+    /// Puts a report together.
+    #[must_use]
+    pub fn new(parts: &UsblParts<'_>) -> Self {
+        let UsblParts { t0, loaded, fixes, plan, dive, .. } = *parts;
+        let since_t0 = |s: f64| plan.origin.plus_seconds(s).seconds_since(t0);
+        let span = |(a, b): (f64, f64)| (since_t0(a), since_t0(b));
+        let (track, prediction) = (&dive.fusion.track, &dive.prediction);
+        let end = |p: Option<&crate::track::TrackPoint>| p.map_or(0.0, |p| p.time.seconds_since(t0));
+        Self {
+            version: env!("CARGO_PKG_VERSION").into(),
+            input: parts.input.into(),
+            output: parts.output.into(),
+            t0_ns: t0.ns().to_string(),
+            source: SourceReport::new(loaded, fixes, true, fixes.span_s().map(span)),
+            fixes: FixesReport::of(&dive.cleaned.judged),
+            exchanges: ExchangesReport {
+                count: dive.cleaned.wild_cycles.len(),
+                thrown_out: dive.cleaned.wild_cycles.iter().filter(|wild| **wild).count(),
+                cycle_s: dive.cycle_s,
+            },
+            depth: parts.depth.map(|(path, samples)| DepthReport { path: path.into(), samples }),
+            track: UsblTrackReport {
+                frame_id: track.frame_id.clone(),
+                origin: parts.origin,
+                points: track.points.len(),
+                rate_hz: plan.rate_hz,
+                span_s: (end(track.points.first()), end(track.points.last())),
+                noise_scale: dive.cleaned.noise_scale,
+                acceleration_density: dive.cleaned.acceleration_density,
+            },
+            phases: phases_of(&dive.fusion, std::slice::from_ref(fixes), span),
+            prediction: PredictionReport {
+                method: prediction.points.first().map_or(String::new(), |p| p.method.name().into()),
+                points: prediction.points.len(),
+                rmse_m: dive.prediction_rmse_m[0],
+                silent_rmse_m: dive.prediction_rmse_m[1],
+            },
+            notes: parts.notes.to_vec(),
+            warnings: parts.warnings.to_vec(),
+        }
+    }
+}
+
+/// The report as text. It doesn't name the files, which may change without the track changing.
+#[must_use]
+pub fn render_usbl(report: &UsblReport) -> String {
+    let mut page = String::new();
+    // writing to a String can't fail
+    let _ = write_page(&mut page, report);
+    page
+}
+
+fn write_page(out: &mut String, report: &UsblReport) -> fmt::Result {
+    let (source, track, fixes) = (&report.source, &report.track, &report.fixes);
+    let paths = source.position.as_deref().map(printable).unwrap_or_default();
+    write!(out, "fixes   {} of {paths}, timed by {}", source.positions, source.clock)?;
+    if let (Some(sigma), Some(from)) = (source.position_sigma_m, &source.position_sigma_from) {
+        write!(out, ", sigma {sigma:.2} m ({from})")?;
+    }
+    writeln!(out)?;
+    writeln!(out, "        {} kept", fixes.kept)?;
+    for (count, why) in [
+        (fixes.off_by_itself, "thrown out: each off by itself"),
+        (fixes.off_as_cycle, "thrown out with their whole exchange"),
+        (fixes.off_depth, "thrown out: not at the depth sensor's depth"),
+        (fixes.repeated, "thrown out: they repeat another one"),
+        (fixes.late, "came late, and are not in the prediction"),
+    ] {
+        if count > 0 {
+            writeln!(out, "        {count} {why}")?;
+        }
+    }
+    let ExchangesReport { count, thrown_out, cycle_s } = report.exchanges;
+    writeln!(out, "        {count} exchanges, {cycle_s:.1} s apart; {thrown_out} thrown out as a whole")?;
+    if let Some(DepthReport { path, samples }) = &report.depth {
+        writeln!(out, "depth   {samples} of {}", printable(path))?;
+    }
+    writeln!(out)?;
+    let duration = track.span_s.1 - track.span_s.0;
+    write!(out, "track   {} points at {} Hz over {duration:.2} s", track.points, short(track.rate_hz))?;
+    if !track.frame_id.is_empty() {
+        write!(out, ", frame {:?}", track.frame_id)?;
+    }
+    writeln!(out)?;
+    text::origin(out, track.origin)?;
+    let ([across, down], [q_across, q_down]) = (track.noise_scale, track.acceleration_density);
+    writeln!(
+        out,
+        "        noise / stated: {across:.2} {down:.2}; liveliness {q_across:.1e} {q_down:.1e} m2/s3 (horizontal, vertical)"
+    )?;
+    let prediction = &report.prediction;
+    let off = |v: Option<f64>| v.map_or("-".into(), |v| format!("{v:.1} m"));
+    writeln!(
+        out,
+        "prediction by the past alone ({}): {} off the track while fixes come, {} in silence",
+        prediction.method,
+        off(prediction.rmse_m),
+        off(prediction.silent_rmse_m)
+    )?;
+    writeln!(out)?;
+    text::phases(out, &report.phases)?;
+    text::notes(out, &report.notes)?;
+    text::warnings(out, &report.warnings)
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_schema_in_the_tree_is_that_of_this_code() {
+        super::super::tests::assert_schema(&schemars::schema_for!(super::UsblReport), "usbl");
+    }
+}
