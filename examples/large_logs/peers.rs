@@ -82,7 +82,7 @@ pub(crate) fn rewrite(input: &Path, output: &Path, fitted: &Fitted) {
         encoding: Encoding::Json,
         geodetic: None,
     };
-    for (i, message) in messages(&fitted.fusion, context, "", &[]).enumerate() {
+    for (i, message) in messages(&fitted.fusion, context, "", &[], Vec::new()).enumerate() {
         let time = message.time.to_log();
         let channel_id = channels[message.topic as usize];
         let header = MessageHeader { channel_id, sequence: i as u32, log_time: time, publish_time: time };
