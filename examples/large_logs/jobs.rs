@@ -92,7 +92,7 @@ pub(crate) struct Fitted {
 fn fit(input: &Path) -> Fitted {
     let mut config = Config::default();
     let log = Log::open(input).expect("a log");
-    config.source = source::recognise(&log, &config.output.prefix).expect("sources").sources;
+    config.source = source::recognise(&log).expect("sources").sources;
     let Samples { mut loaded, origin, .. } =
         source::load(&log, &config.source, false, None).expect("samples");
     let datum = source::datum(&config.source);

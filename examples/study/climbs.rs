@@ -25,7 +25,7 @@ impl Recording {
     /// The sources that `trackfuse fuse` finds by itself.
     pub(crate) fn open(log: &Path) -> Self {
         let log = Log::open(log).expect("a log");
-        let configs = source::recognise(&log, "/fused").expect("sources").sources;
+        let configs = source::recognise(&log).expect("sources").sources;
         let source::Samples { loaded, origin, .. } =
             source::load(&log, &configs, false, None).expect("samples");
         Self { loaded, origin }

@@ -9,21 +9,19 @@ use sha2::{Digest, Sha256};
 use super::progress::Bar;
 use super::{CommandError, beside, checked, note, options};
 use crate::cli::Addition;
-use crate::config::{Config, Output};
+use crate::config::Config;
 use crate::log::{Appender, Destination, Log, LogError, NewMessage, NewMetadata, ReadOptions, put_back};
 use crate::publish::{Published, Topic};
 use crate::track::{Track, TrackPoint};
 
-/// The config that is asked for; its prefix is `prefix` where nothing asks for another.
-pub(super) fn config(args: &Addition, prefix: &str) -> Result<Config, CommandError> {
+/// The config that is asked for, with the new topics' prefix: `usual` where nothing asks for another.
+pub(super) fn config(args: &Addition, usual: &str) -> Result<Config, CommandError> {
     let mut config = args.config.as_deref().map_or_else(|| Ok(Config::default()), Config::read)?;
-    if config.output.prefix == Output::PREFIX {
-        config.output.prefix = prefix.into();
-    }
-    if let Some(prefix) = &args.prefix {
-        config.output.prefix.clone_from(prefix);
+    if args.prefix.is_some() {
+        config.output.prefix.clone_from(&args.prefix);
         config.check()?;
     }
+    config.output.prefix.get_or_insert_with(|| usual.into());
     Ok(config)
 }
 
@@ -110,7 +108,7 @@ pub(super) fn metadata(
         ("report", without_file_names(report)),
     ];
     Ok(NewMetadata {
-        name: format!("trackfuse:{}", config.output.prefix),
+        name: format!("trackfuse:{}", config.output.prefix()),
         entries: entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect(),
     })
 }

@@ -7,7 +7,7 @@ use crate::config::{Config, Output};
 use crate::fusion;
 use crate::log::{Appender, Encoding, Log, bad_chunks};
 use crate::math::geodesy::{Geodetic, LocalFrame};
-use crate::publish::{Context, Topic, messages};
+use crate::publish::{Context, Stream, Topic, fix_messages, messages};
 use crate::report::{self, Report, html};
 use crate::resolve;
 use crate::sample::Source;
@@ -19,14 +19,14 @@ use crate::time::Time;
 /// # Errors
 /// [`CommandError`], and then nothing is written.
 pub fn fuse(args: &Addition) -> Result<Outcome, CommandError> {
-    let mut config = addition::config(args, Output::PREFIX)?;
+    let mut config = addition::config(args, Output::FUSED)?;
     let bar = Bar::new(args.voice);
     let (log, mut warnings) = addition::open(args, &bar)?;
     let destination = addition::destination(args, "fused");
     let usual = Encoding::of_profile(&log.index().profile);
     let encoding = *config.output.encoding.get_or_insert(usual);
     let all =
-        Topic::channels(&Topic::written(&Topic::FUSED, encoding, true), &config.output.prefix, encoding);
+        Topic::channels(&Topic::written(&Topic::FUSED, encoding, true), config.output.prefix(), encoding);
     Appender::check(&log, &destination, &all)?;
     html_report::check(args, &log, &destination)?;
 
@@ -49,7 +49,7 @@ pub fn fuse(args: &Addition) -> Result<Outcome, CommandError> {
     let sources: Vec<Source> = loaded.iter_mut().map(|l| std::mem::take(&mut l.source)).collect();
     let geodetic = config.output.origin.map(|place| LocalFrame::new(Geodetic::from_degrees(place)));
     let topics = Topic::written(&Topic::FUSED, encoding, geodetic.is_some());
-    let channels = Topic::channels(&topics, &config.output.prefix, encoding);
+    let channels = Topic::channels(&topics, config.output.prefix(), encoding);
     let compression = config.output.compression;
     let begin = || Appender::begin(&log, &destination, &channels, compression);
     // a new file's copy of the log gets on while the track is fitted; the log itself is not touched before it must be
@@ -106,7 +106,8 @@ pub fn fuse(args: &Addition) -> Result<Outcome, CommandError> {
     let mut appender = begun.map_or_else(begin, Ok)?;
     appender.leave_out(bad_chunks(&damaged));
     bar.doing("writing the track");
-    let messages = messages(&fusion, context, &text, &warnings, Vec::new());
+    let places: Stream<'_> = Box::new(fix_messages(Topic::Fix, &fusion, context));
+    let messages = messages(&fusion, context, &text, &warnings, vec![places]);
     addition::write(&mut appender, messages, &topics, shift_s)?;
     appender.add_metadata(metadata);
     appender.finish()?;
@@ -122,7 +123,7 @@ fn choose_sources(log: &Log, config: &mut Config) -> Result<Recognised, CommandE
     if !config.source.is_empty() {
         return Ok(Recognised::default());
     }
-    let mut recognised = source::recognise(log, &config.output.prefix)?;
+    let mut recognised = source::recognise(log)?;
     config.source = std::mem::take(&mut recognised.sources);
     Ok(recognised)
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::progress::Bar;
 use super::{CommandError, Outcome, open, show};
 use crate::cli::Init;
-use crate::config::{Config, SourceTable, template};
+use crate::config::{SourceTable, template};
 use crate::log::{LogError, write_new};
 use crate::printable::{printable, shell_word};
 use crate::report::InitReport;
@@ -24,7 +24,7 @@ pub fn init(args: &Init) -> Result<Outcome, CommandError> {
         log.ensure_other(output)?;
     }
     let proposal = if args.source.is_empty() {
-        source::propose(&log, &Config::default().output.prefix)?
+        source::propose(&log)?
     } else {
         source::propose_chosen(&log, &args.source)?
     };

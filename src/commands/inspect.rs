@@ -3,7 +3,6 @@
 use super::progress::Bar;
 use super::{CommandError, Outcome, open, options, show, warn};
 use crate::cli::Inspect;
-use crate::config::Config;
 use crate::inspect::{inspect as look_into, verified};
 use crate::log::verify::verify;
 use crate::report;
@@ -19,7 +18,7 @@ pub fn inspect(args: &Inspect) -> Result<Outcome, CommandError> {
         // What a log that can't be opened has wrong with it is not for a report of what is in it.
         warn(args.voice, &verification.as_ref().map(verified::warnings).unwrap_or_default());
     })?;
-    let mut inspection = look_into(&log, &Config::default().output.prefix);
+    let mut inspection = look_into(&log);
     if let Some(verification) = verification {
         verified::add(&mut inspection, verification);
     }

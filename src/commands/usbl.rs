@@ -3,12 +3,12 @@
 use super::progress::Bar;
 use super::{CommandError, Outcome, addition, html_report, say};
 use crate::cli::Addition;
-use crate::config::{Config, SourceConfig};
+use crate::config::{Config, Output, SourceConfig};
 use crate::estimate::usbl::{Height, Warning};
 use crate::fusion;
 use crate::log::{Appender, Encoding, Log, LogError, bad_chunks};
 use crate::math::geodesy::{Geodetic, LocalFrame};
-use crate::publish::{Context, Topic, messages, track_messages, usbl_fix_messages};
+use crate::publish::{Context, Stream, Topic, fix_messages, messages, track_messages, usbl_fix_messages};
 use crate::report::{UsblParts, UsblReport, html, render_usbl};
 use crate::resolve;
 use crate::sample::Source;
@@ -23,13 +23,14 @@ const NAME: &str = "usbl";
 /// # Errors
 /// [`CommandError`], and then nothing is written.
 pub fn usbl(args: &Addition) -> Result<Outcome, CommandError> {
-    let mut config = addition::config(args, "/usbl")?;
+    let mut config = addition::config(args, Output::USBL)?;
     let bar = Bar::new(args.voice);
     let (log, mut warnings) = addition::open(args, &bar)?;
     let destination = addition::destination(args, "usbl");
     let usual = Encoding::of_profile(&log.index().profile);
     let encoding = *config.output.encoding.get_or_insert(usual);
-    let all = Topic::channels(&Topic::written(&Topic::USBL, encoding, true), &config.output.prefix, encoding);
+    let all =
+        Topic::channels(&Topic::written(&Topic::USBL, encoding, true), config.output.prefix(), encoding);
     Appender::check(&log, &destination, &all)?;
     html_report::check(args, &log, &destination)?;
 
@@ -79,7 +80,7 @@ pub fn usbl(args: &Addition) -> Result<Outcome, CommandError> {
     let text = render_usbl(&report);
 
     let topics = Topic::written(&Topic::USBL, encoding, geodetic.is_some());
-    let channels = Topic::channels(&topics, &config.output.prefix, encoding);
+    let channels = Topic::channels(&topics, config.output.prefix(), encoding);
     let kept = std::slice::from_ref(&dive.kept);
     let context = Context {
         sources: kept,
@@ -101,7 +102,8 @@ pub fn usbl(args: &Addition) -> Result<Outcome, CommandError> {
     bar.doing("writing the track");
     let judged = usbl_fix_messages(&fixes.positions, &dive.cleaned.judged, &plan.frame_id, context);
     let prediction = track_messages(Topic::Prediction, &dive.prediction, context);
-    let more: Vec<crate::publish::Stream<'_>> = vec![Box::new(prediction), Box::new(judged)];
+    let places = fix_messages(Topic::TrackFix, &dive.fusion, context);
+    let more: Vec<Stream<'_>> = vec![Box::new(prediction), Box::new(judged), Box::new(places)];
     let messages = messages(&dive.fusion, context, &text, &warnings, more);
     addition::write(&mut appender, messages, &topics, shift_s)?;
     appender.add_metadata(metadata);
@@ -118,7 +120,7 @@ fn choose_fixes(log: &Log, config: &mut Config) -> Result<Vec<LogError>, Command
     if config.usbl.fix.is_some() {
         return Ok(Vec::new());
     }
-    let (path, damaged) = source::usbl_fix(log, &config.output.prefix)?;
+    let (path, damaged) = source::usbl_fix(log)?;
     config.usbl.fix = Some(path);
     Ok(damaged)
 }

@@ -18,10 +18,9 @@ impl Config {
         };
         let (output, fusion, beyond) = (&self.output, &self.fusion, &self.extrapolation);
         let plain = |c: char| c.is_alphanumeric() || "/_-.".contains(c);
-        let prefix_ok = output.prefix.starts_with('/')
-            && !output.prefix.ends_with('/')
-            && output.prefix.chars().all(plain);
-        range(prefix_ok, "output.prefix".into(), format!("{:?}", output.prefix), "\"/name\"")?;
+        let prefix = output.prefix();
+        let prefix_ok = prefix.starts_with('/') && !prefix.ends_with('/') && prefix.chars().all(plain);
+        range(prefix_ok, "output.prefix".into(), format!("{prefix:?}"), "\"/name\"")?;
         positive("output.rate_hz", output.rate_hz)?;
         range(
             output.rate_hz.is_none_or(|r| (0.001..=10_000.0).contains(&r)),

@@ -104,8 +104,10 @@ pub struct Config {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Output {
-    /// Prefix of the new topics; `trackfuse usbl` takes /usbl instead of /fused.
-    pub prefix: String,
+    /// Prefix of the new topics; default: `/fused`, of `trackfuse usbl` `/usbl`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = &"/fused")]
+    pub prefix: Option<String>,
     /// Points of the track a second; default: the fastest source's rate.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(example = 50.0)]
@@ -137,14 +139,22 @@ pub struct Output {
 }
 
 impl Output {
-    /// The prefix of a fused track's topics.
-    pub const PREFIX: &str = "/fused";
+    /// The usual prefix of a fused track's topics.
+    pub const FUSED: &str = "/fused";
+    /// The usual prefix of a USBL track's topics.
+    pub const USBL: &str = "/usbl";
+
+    /// The prefix of the new topics.
+    #[must_use]
+    pub fn prefix(&self) -> &str {
+        self.prefix.as_deref().unwrap_or(Self::FUSED)
+    }
 }
 
 impl Default for Output {
     fn default() -> Self {
         Self {
-            prefix: Self::PREFIX.into(),
+            prefix: None,
             rate_hz: None,
             frame_id: None,
             origin: None,

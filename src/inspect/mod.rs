@@ -14,6 +14,7 @@ pub mod verified;
 
 use std::collections::BTreeMap;
 
+use crate::config::Output;
 use crate::config::SourceConfig;
 use crate::log::{Encoding, Excerpt, Index, Log, TimesRead};
 use crate::publish::Topic;
@@ -29,15 +30,15 @@ use rhythm::{Rhythm, Told};
 const BUDGET_BYTES: u64 = 128 << 20;
 
 /// Looks into a log. Nothing here is an error: what is wrong with the log, or can't be told, stands in the
-/// answer. Topics below `prefix` count as earlier results.
+/// answer.
 #[must_use]
-pub fn inspect(log: &Log, prefix: &str) -> Inspection {
+pub fn inspect(log: &Log) -> Inspection {
     let index = log.index();
     let mut rhythms: BTreeMap<u16, Rhythm> = BTreeMap::new();
     let times = log.for_each_log_time(BUDGET_BYTES, |id, times| rhythms.entry(id).or_default().add(times));
     let rhythms: BTreeMap<u16, Told> = rhythms.into_iter().map(|(id, rhythm)| (id, rhythm.told())).collect();
     let extent = Extent::of(index, &rhythms, &times);
-    let judgement = source::judge(log, prefix);
+    let judgement = source::judge(log);
     let recognised = judgement.sources();
     let (glimpses, excerpt) = channels::glimpses(log, &judgement);
     let channels =
@@ -50,7 +51,7 @@ pub fn inspect(log: &Log, prefix: &str) -> Inspection {
         checksums: checksums(index, &times, &excerpt),
         verification: None,
         earlier_results: earlier_results(&judgement),
-        fuse: fuse(log, recognised.as_ref(), prefix),
+        fuse: fuse(log, recognised.as_ref()),
         clocks_read: ClocksRead { parts: excerpt.read, of: excerpt.parts },
         channels,
         notes: Vec::new(),
@@ -164,7 +165,7 @@ fn earlier_results(judgement: &Judgement) -> Vec<String> {
 }
 
 /// What `fuse` would take, or what is not clear.
-fn fuse(log: &Log, recognised: Result<&Recognised, &SourceError>, prefix: &str) -> FuseReport {
+fn fuse(log: &Log, recognised: Result<&Recognised, &SourceError>) -> FuseReport {
     let taken = |config: &SourceConfig| TakenSource {
         name: config.name.clone(),
         datum: config.datum,
@@ -184,7 +185,7 @@ fn fuse(log: &Log, recognised: Result<&Recognised, &SourceError>, prefix: &str) 
     let encoding = Encoding::of_profile(&log.index().profile);
     let new = Topic::written(&Topic::FUSED, encoding, true)
         .into_iter()
-        .map(|topic| topic.channel(prefix, encoding).topic);
+        .map(|topic| topic.channel(Output::FUSED, encoding).topic);
     let new: Vec<String> = new.collect();
     let taken_topic = new.iter().find(|topic| log.index().channels_of(topic).next().is_some());
     let taken_topic = taken_topic.map(|t| format!("{t} is in the log already: `--prefix` names others"));

@@ -55,8 +55,10 @@ impl Payload for GeoJsonMessage {
     type Ros = Self;
 }
 
-/// The places of a track's points, thinned, and always that of the last.
-pub(super) fn fix_messages<'a>(
+/// The places of a track's points as messages of `topic`, thinned, and always that of the last; none where the track has
+/// no place on the earth.
+pub fn fix_messages<'a>(
+    topic: Topic,
     fusion: &'a Fusion,
     context: Context<'a>,
 ) -> impl Iterator<Item = Published> + 'a {
@@ -66,7 +68,7 @@ pub(super) fn fix_messages<'a>(
     let last = points.last().filter(|_| !(points.len() - 1).is_multiple_of(step));
     points.iter().step_by(step).chain(last).filter_map(move |point| {
         let message = fix_message(point, &frame?)?;
-        Some(context.publish(Topic::Fix, point.time, message))
+        Some(context.publish(topic, point.time, message))
     })
 }
 

@@ -18,6 +18,7 @@ mod scene;
 mod usbl_fix;
 
 pub(crate) use fields::{Stamp, Xyz};
+pub use map::fix_messages;
 pub(crate) use payload::cdr;
 pub use point::track_messages;
 pub use usbl_fix::usbl_fix_messages;
@@ -25,7 +26,7 @@ pub use usbl_fix::usbl_fix_messages;
 use event::event_message;
 use fields::drawn_in;
 use log::log_messages;
-use map::{fix_messages, geojson_message};
+use map::geojson_message;
 use payload::Payload;
 use pose::pose_messages;
 use residual::residual_messages;
@@ -65,6 +66,8 @@ pub enum Topic {
     Prediction,
     /// USBL fixes with what became of them.
     UsblFixes,
+    /// The same as [`Self::Fix`], where a sensor's fixes bear that name.
+    TrackFix,
 }
 
 impl Topic {
@@ -91,7 +94,7 @@ impl Topic {
         Self::Pose,
         Self::Log,
         Self::Path,
-        Self::Fix,
+        Self::TrackFix,
         Self::GeoJson,
     ];
 
@@ -100,7 +103,7 @@ impl Topic {
     pub fn written(topics: &[Self], encoding: Encoding, has_place: bool) -> Vec<Self> {
         let is_written = |topic: &Self| match topic {
             Self::Path => encoding == Encoding::Cdr,
-            Self::Fix | Self::GeoJson => has_place,
+            Self::Fix | Self::TrackFix | Self::GeoJson => has_place,
             _ => true,
         };
         topics.iter().copied().filter(is_written).collect()
@@ -148,6 +151,7 @@ impl Topic {
             Self::Log => ("log", schemas!("foxglove.Log", "rcl_interfaces.Log")),
             Self::Path => ("path", schemas!("nav_msgs.Path")),
             Self::Fix => ("fix", schemas!("foxglove.LocationFix", "sensor_msgs.NavSatFix")),
+            Self::TrackFix => ("track_fix", schemas!("foxglove.LocationFix", "sensor_msgs.NavSatFix")),
             Self::GeoJson => ("geojson", schemas!("foxglove.GeoJSON", "foxglove_msgs.GeoJSON")),
         };
         let topic = format!("{prefix}/{name}");
@@ -231,13 +235,12 @@ pub fn messages<'a>(
     let events = fusion.events.iter().filter_map(|e| event_message(e, frame, &context));
     let mut events: Vec<Published> = events.collect();
     events.sort_by_key(|e| e.time);
-    let streams: [Stream<'a>; 6] = [
+    let streams: [Stream<'a>; 5] = [
         Box::new(track_messages(Topic::Track, &fusion.track, context)),
         Box::new(track_messages(Topic::Pcf, &fusion.plain_pcf, context)),
         Box::new(events.into_iter()),
         Box::new(residual_messages(&fusion.residuals, frame, context)),
         Box::new(pose_messages(&fusion.track, context)),
-        Box::new(fix_messages(fusion, context)),
     ];
     let mut streams: Vec<_> = streams.into_iter().chain(more).map(Iterator::peekable).collect();
     head.chain(std::iter::from_fn(move || {

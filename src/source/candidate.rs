@@ -7,13 +7,37 @@ use super::SourceError;
 use super::fix::fix;
 use super::topic::{is_reference, sensor_word, vector_is};
 use crate::log::decode::{Decoder, MessagePath, Value};
-use crate::log::{Index, Log, LogError};
+use crate::log::{Channel, Index, Log, LogError};
 use crate::printable::printable;
 use crate::sample::Quantity;
 
 /// Schemas of an earlier run's results, known even where its metadata record is lost.
-const OWN_SCHEMAS: [&str; 4] =
-    ["trackfuse.TrackPoint", "trackfuse.CharacteristicPoint", "trackfuse.Residual", "trackfuse.UsblFix"];
+const OWN_SCHEMAS: [&str; 7] = [
+    "trackfuse.TrackPoint",
+    "trackfuse.CharacteristicPoint",
+    "trackfuse.Residual",
+    "trackfuse.UsblFix",
+    "trackfuse_msgs/msg/CharacteristicPoint",
+    "trackfuse_msgs/msg/Residual",
+    "trackfuse_msgs/msg/UsblFix",
+];
+
+/// What an earlier run's topics are called below its prefix.
+const OWN_NAMES: [&str; 13] = [
+    "track",
+    "pcf",
+    "events",
+    "residuals",
+    "scene",
+    "pose",
+    "log",
+    "path",
+    "fix",
+    "geojson",
+    "prediction",
+    "fixes",
+    "track_fix",
+];
 
 /// Where the usual messages keep a position, the most specific first.
 const POSITION_FIELDS: [&str; 6] =
@@ -92,17 +116,18 @@ pub struct Judgement {
 
 /// Judges every channel of a log by its name and its first message.
 ///
-/// Channels whose topics begin with `prefix`, and those that this program wrote, can't be sources.
+/// Those that this program wrote can't be sources.
 #[must_use]
-pub fn judge(log: &Log, prefix: &str) -> Judgement {
+pub fn judge(log: &Log) -> Judgement {
     let index = log.index();
+    let own = own_topics(index);
     let (mut decoders, mut verdicts) = (BTreeMap::new(), BTreeMap::new());
     let silent = silent(index);
     for channel in index.channels.values() {
         let schema = index.schema_of(channel);
         let (encoding, name, data) =
             schema.map_or(("", "", &[][..]), |s| (s.encoding.as_str(), s.name.as_str(), s.data.as_slice()));
-        let unfit = if is_own(index, &channel.topic, prefix) || OWN_SCHEMAS.contains(&name) {
+        let unfit = if own.contains(&channel.topic) {
             Unfit::Own
         } else if is_reference(&channel.topic) {
             Unfit::Reference
@@ -136,10 +161,24 @@ pub fn judge(log: &Log, prefix: &str) -> Judgement {
     Judgement { log: log.path().display().to_string(), channels, damaged }
 }
 
-/// Whether a topic is below `prefix`, or below that of an earlier run, which its metadata record names.
-fn is_own(index: &Index, topic: &str, prefix: &str) -> bool {
-    let below = |prefix: &str| topic.strip_prefix(prefix).is_some_and(|rest| rest.starts_with('/'));
-    below(prefix) || index.metadata.iter().filter_map(|m| m.name.strip_prefix("trackfuse:")).any(below)
+/// The topics of earlier runs, whose prefixes their metadata records name, and where those are lost their schemas.
+fn own_topics(index: &Index) -> BTreeSet<String> {
+    let of_own_schema = |c: &&Channel| {
+        let schema = index.schema_of(c);
+        schema.is_some_and(|s| OWN_SCHEMAS.contains(&s.name.as_str()))
+    };
+    let recorded = index.metadata.iter().filter_map(|m| m.name.strip_prefix("trackfuse:"));
+    let by_schema =
+        index.channels.values().filter(of_own_schema).filter_map(|c| Some(c.topic.rsplit_once('/')?.0));
+    let prefixes: BTreeSet<&str> = recorded.chain(by_schema).collect();
+    let has = |topic: &str| index.channels_of(topic).next().is_some();
+    let below = |prefix: &&str| {
+        // a run that judges fixes leaves this name to the sensor's own topic
+        let names = OWN_NAMES.into_iter().filter(|name| *name != "fix" || !has(&format!("{prefix}/fixes")));
+        names.map(|name| format!("{prefix}/{name}")).collect::<Vec<_>>()
+    };
+    let schemas = index.channels.values().filter(of_own_schema).map(|c| c.topic.clone());
+    prefixes.iter().flat_map(below).chain(schemas).collect()
 }
 
 /// What a topic of the log holds by its first message, whatever its name.

@@ -34,8 +34,8 @@ const BUDGET_BYTES: u64 = 64 << 20;
 ///
 /// # Errors
 /// [`SourceError`] where the log can't be read.
-pub fn propose(log: &Log, prefix: &str) -> Result<Proposal, SourceError> {
-    let recognised = match recognise(log, prefix) {
+pub fn propose(log: &Log) -> Result<Proposal, SourceError> {
+    let recognised = match recognise(log) {
         Ok(recognised) => recognised,
         Err(SourceError::Unrecognised { candidates, .. }) => {
             let what = if candidates.is_empty() {

@@ -36,16 +36,15 @@ pub struct Choice {
 
 /// Recognises the sources of a log.
 ///
-/// Channels whose topics begin with `prefix`, and those that this program wrote, are passed over, and so are parts of
-/// the log that are damaged.
+/// Channels that this program wrote are passed over, and so are parts of the log that are damaged.
 ///
 /// # Errors
 /// [`SourceError::Unrecognised`] where no topic holds a sensor's word, [`SourceError::Ambiguous`] where
 /// several channels offer the same for one sensor, or several sensors could be the datum;
 /// [`SourceError::Log`] instead where a part of the log that was looked into is damaged, and where nothing can be read
 /// of a sensor: without it another would become the datum.
-pub fn recognise(log: &Log, prefix: &str) -> Result<Recognised, SourceError> {
-    let mut judgement = judge(log, prefix);
+pub fn recognise(log: &Log) -> Result<Recognised, SourceError> {
+    let mut judgement = judge(log);
     let lost = |channel: &Judged| {
         let topic = &channel.topic;
         channel.verdict == Err(Unfit::Unreadable) && sensor_word(topic).is_some() && !is_reference(topic)

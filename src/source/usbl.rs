@@ -10,8 +10,8 @@ use crate::log::{Log, LogError};
 /// # Errors
 /// [`SourceError::NoUsbl`] where there is none or several; [`SourceError::Log`] instead where a part that was looked into
 /// is damaged.
-pub fn usbl_fix(log: &Log, prefix: &str) -> Result<(String, Vec<LogError>), SourceError> {
-    let mut judgement = judge(log, prefix);
+pub fn usbl_fix(log: &Log) -> Result<(String, Vec<LogError>), SourceError> {
+    let mut judgement = judge(log);
     let fit = judgement.channels.into_iter().filter_map(|channel| channel.verdict.ok());
     let mut fit: Vec<Candidate> = fit.filter(|candidate| candidate.position.is_some()).collect();
     fit.sort_by(|a, b| a.topic.cmp(&b.topic));

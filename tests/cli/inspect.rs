@@ -318,7 +318,7 @@ fn inspect_has_an_answer_or_an_error_wherever_a_byte_is_wrong() {
         fs::write(&path, &bytes).unwrap();
         if let Ok(log) = trackfuse::log::Log::open(&path) {
             opened += 1;
-            let inspection = trackfuse::inspect::inspect(&log, "/fused");
+            let inspection = trackfuse::inspect::inspect(&log);
             assert!(trackfuse::report::render_inspection(&inspection).contains("in.mcap"));
         }
     }
