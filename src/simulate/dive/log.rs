@@ -252,3 +252,6 @@ fn notes(dive: &SimulatedDive) -> String {
         dive.deepest_m()
     )
 }
+
+#[cfg(test)]
+mod tests;

@@ -101,7 +101,8 @@ pub fn simulate_dive(scenario: &DiveScenario) -> Result<SimulatedDive, SimulateE
         heard = UsblConstants { sigma_m: 0.0, ..heard }; // the noise is then of range and angles
     }
     let mut record = watch_by_usbl(&trajectory, end_s, &heard, &mut rng);
-    record.silence_s = record.silence_s.filter(|[begin_s, _]| *begin_s < end_s);
+    let silence_s = record.silence_s.map(|silence_s| silence_s.map(|t| t.min(end_s)));
+    record.silence_s = silence_s.filter(|[begin_s, silent_until_s]| begin_s < silent_until_s);
     let messages =
         messages(&record, scenario, &mut stream(Purpose::Arrival), &mut stream(Purpose::PolarNoise));
     let ship = scenario.ship.navigation(end_s, &mut stream(Purpose::Ship));

@@ -64,7 +64,7 @@ fn usbl(table: &Table, c: &UsblConstants, duration_s: f64) -> Result<(), Simulat
         ("wild_fixes", c.wild_fixes, 0.0, 1.0),
         ("wild_cycles", c.wild_cycles, 0.0, 1.0),
         ("lost_cycles", c.lost_cycles, 0.0, 1.0),
-        ("silence_s", c.silence_s, 0.0, duration_s),
+        ("silence_s", c.silence_s, 0.0, MAX_DURATION_S),
         ("silence_margin_s", c.silence_margin_s, 0.0, MAX_DURATION_S),
     ])?;
     table.range("wild_m", c.wild_m, 0.01, 1e5)?;
