@@ -185,10 +185,12 @@ pub struct Restore {
 #[command(after_help = "Examples:
   trackfuse simulate sample_logs/steep_climb.scenario.toml -o climb.mcap
   trackfuse fuse climb.mcap && trackfuse compare climb.fused.mcap --reference /reference/ins
+  trackfuse simulate sample_logs/usbl_dive.scenario.toml -o dive.mcap
+  trackfuse usbl dive.mcap; trackfuse compare dive.usbl.mcap --estimate /usbl/track --reference /reference/ins
 
 Exit codes: 0 done; 1 failed, nothing written; 2 scenario wrong, or output exists")]
 pub struct Simulate {
-    /// The scenario file (TOML; see `sample_logs`)
+    /// The scenario file (TOML; see `sample_logs`): of a dive seen by USBL with a table `[dive]`, else of a climb
     pub scenario: PathBuf,
     /// The log to write
     #[arg(long, short, value_name = "LOG")]

@@ -27,6 +27,7 @@ mod cli {
     mod report;
     mod restore;
     mod restore_of_changed;
+    mod simulate;
     mod sources;
     mod trial;
     mod trial_log;

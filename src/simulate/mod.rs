@@ -1,13 +1,14 @@
-//! Recordings of climbs that never were, with their truth: a point mass, its sensors, and a log that looks
-//! like a real one.
+//! Recordings of climbs and dives that never were, with their truth: a point mass, its sensors, and a log that
+//! looks like a real one.
 //!
 //! ```text
-//! Scenario -> climb (truth) -> sensors (samples) -> Simulation -> log (MCAP)
+//! Scenario     -> climb (truth) -> sensors (samples)    -> Simulation    -> log (MCAP)
+//! DiveScenario -> dive (truth)  -> USBL, ship and depth -> SimulatedDive -> log (MCAP)
 //! ```
 //!
-//! Everything up to [`Simulation`] is pure: the same scenario gives the same numbers, and random numbers come
-//! from its seed alone. A simulated log is the same to the byte, as far as the platform's sines and
-//! exponentials are.
+//! Everything up to [`Simulation`] and [`SimulatedDive`] is pure: the same scenario gives the same numbers, and
+//! random numbers come from its seed alone. A simulated log is the same to the byte, as far as the platform's
+//! sines and exponentials are.
 
 mod band_noise;
 mod bystanders;

@@ -247,7 +247,7 @@ fn notes(dive: &SimulatedDive) -> String {
     format!(
         "Dive notes\n\
          Ballasted descent, survey legs, ascent; {:.0} m at the deepest. Transducer over the side before release.\n\
-         Sea state 2, current below 0.1 m/s.\n\
+         Sea state 2.\n\
          This is a simulated trial: scenario.toml made it.\n",
         dive.deepest_m()
     )

@@ -192,6 +192,11 @@ fn latitudes_longitudes_and_depths_lead_back_to_the_truth() {
         let off = Vector3::from(fix.value) - dive.trajectory.at(message.stamp_s).position;
         assert!(off.norm() < 2e-3, "{off}");
     }
+    // where the sea's surface is 200 m below the frame's plane
+    let far = place_json(&frame, &Vector3::new(4e4, -3e4, -900.0), "depth", 900.0);
+    let place = ["latitude", "longitude"].map(|key| far[key].as_f64().unwrap());
+    let fix = fix_from_depth(0.0, place, 900.0, &frame, [1.0; 3]);
+    assert!((fix.value[0] - 4e4).hypot(fix.value[1] + 3e4) < 2e-3, "{fix:?}");
     let ship = &topics["/ship/navigation"][0];
     assert!((ship.number("latitude") + 33.9 - 200.0 / 110_900.0).abs() < 5e-5, "{}", ship.said);
     assert!(ship.number("altitude").abs() < 10.0 && ship.said.get("position").is_none());
