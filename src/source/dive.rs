@@ -79,7 +79,9 @@ pub fn load_dive(
     })?;
     for source in &mut sources {
         if let Some((_, error)) = lack(source, &read.damaged) {
-            return Err(error);
+            let has_ship = usbl.ship.is_some() && usbl.heading.is_some();
+            let is_unit = matches!(error, SourceError::NoUnit { .. });
+            return Err(if is_unit && !has_ship { SourceError::NoShip { path: path.into() } } else { error });
         }
     }
 

@@ -124,6 +124,10 @@ impl Gathered {
                     let path = path.to_string();
                     return Some((Some(*quantity), SourceError::NoUnit { name, path }));
                 }
+                Some(Fault::NoAngle) => {
+                    let (path, count) = (path.to_string(), self.messages);
+                    return Some((Some(*quantity), SourceError::NotAngles { name, path, count }));
+                }
                 Some(Fault::NoVector { kind, fits }) => (kind, fits),
                 Some(fault) => (fault.description().unwrap_or_default(), Vec::new()),
                 None => {

@@ -85,6 +85,19 @@ pub enum SourceError {
         /// The path.
         path: String,
     },
+    /// Angles beyond those that there are.
+    #[error(
+        "source {name:?}: bearings at {} are beyond a turn, or depressions beyond the vertical, in all {count} messages",
+        printable(path)
+    )]
+    NotAngles {
+        /// The source.
+        name: String,
+        /// The path.
+        path: String,
+        /// Number of messages.
+        count: usize,
+    },
     /// Ranges and bearings, and nothing to count them from.
     #[error(
         "the fixes at {} are ranges, bearings and depressions, expected the ship's position and heading beside them",
@@ -287,9 +300,10 @@ impl SourceError {
                 format!("`[usbl]` with `fix = {path}` in a config names the fixes: `--config`")
             }
             Self::NoUnit { .. } => "`angles = \"deg\"` or `angles = \"rad\"` in `[usbl]` says which".into(),
+            Self::NotAngles { .. } => "if they are degrees, `angles = \"deg\"` in `[usbl]` says so".into(),
             Self::NoShip { .. } => {
                 "`ship = \"/ship/navigation.position\"` and `heading = \"/ship/navigation.heading\"` in `[usbl]` name them, by \
-                 the message paths of your log"
+                 the message paths of your log, and `angles = \"deg\"` or `\"rad\"` the unit of the angles"
                     .into()
             }
             Self::NoOrientation { .. } => {

@@ -7,6 +7,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde_json::{Value, json};
+use trackfuse::sample::Sample;
 use trackfuse::simulate::{DiveConstants, SimulatedFix, Trajectory, UsblConstants, dive, watch_by_usbl};
 
 use super::trial::{Output, Ran, Trial, assert_says, trackfuse};
@@ -208,9 +209,8 @@ fn polar_log(dive: &Dive, names: [&str; 3], per_radian: f64) -> TrialLog {
     for fix in &dive.fixes {
         let t = fix.sample.time_s;
         let (from, heading) = ship(t);
-        let off = if fix.wild { 60.0 } else { 0.0 };
-        let place = dive.position(t);
-        let [east, north, up] = [0, 1, 2].map(|i| place[i] + off - from[i]);
+        let place = if fix.wild { fix.sample.value } else { dive.position(t) };
+        let [east, north, up] = [0, 1, 2].map(|i| place[i] - from[i]);
         let range = (east * east + north * north + up * up).sqrt() + 0.4 * normal();
         let noise = 0.003;
         let bearing = (east.atan2(north) - heading + noise * normal()).rem_euclid(TAU);
@@ -254,7 +254,7 @@ fn ranges_bearings_and_depressions_are_fixes_with_the_ships_position_and_heading
     };
     refused("[usbl]\nangles = \"deg\"\n", &["ship's position and heading", "hint: ", "ship = "]);
     refused(SHIP, &["may be degrees or radians", "hint: ", "angles = "]);
-    refused(&format!("{SHIP}angles = \"rad\"\n"), &["a bearing of more than a turn"]);
+    refused(&format!("{SHIP}angles = \"rad\"\n"), &["beyond a turn", "hint: ", "angles = "]);
     let ran = run(&Trial::of(&in_degrees), &[]);
     assert_says(&ran.stderr, &["ship"]);
 }
@@ -267,18 +267,31 @@ fn noise_that_grows_with_the_range_widens_the_bands_where_the_vehicle_is_far() {
         let message = json!({"timestamp": stamp(ns(f64::from(t))), "position": xyz([0.0, 0.0, -4.0])});
         log.json("/ship/navigation", f64::from(t), &message);
     }
-    dive.fixes.iter().for_each(|fix| log.json("/usbl/fix", fix.sample.time_s, &xyz_message(fix)));
-    let log = log.finish();
-    let near_to_far = |config: &str| {
-        let (_, output) = report(&Trial::of(&log).config(config), 0);
-        let said = &output.topics["/usbl/fixes"];
-        let sigma = |i: usize| said[i].vector("position_sigma")[0];
-        sigma(said.len() / 2) / sigma(2)
-    };
-    assert_eq!(near_to_far("[usbl]\nsigma_m = 0.5\n"), 1.0);
-    let ship = "[usbl]\nsigma_m = 0.5\nship = \"/ship/navigation.position\"\nsigma_of_range = 0.005\n";
-    let grown = near_to_far(ship);
-    assert!(grown > 3.0, "{grown}");
+    for fix in &dive.fixes {
+        let (t, value) = (fix.sample.time_s, fix.sample.value);
+        let place = dive.position(t);
+        let range = place.iter().map(|p| p * p).sum::<f64>().sqrt();
+        let noise = if fix.wild { 1.0 } else { 1.0_f64.hypot(0.005 * range) / 3.0 };
+        let sample =
+            Sample { value: [0, 1, 2].map(|i| place[i] + noise * (value[i] - place[i])), ..fix.sample };
+        log.json("/usbl/fix", t, &xyz_message(&SimulatedFix { sample, ..*fix }));
+    }
+    let ship = "[usbl]\nsigma_m = 1.0\nship = \"/ship/navigation.position\"\nsigma_of_range = 0.005\n";
+    let (found, output) = report(&Trial::of(log.finish()).config(ship), 0);
+    let said = &output.topics["/usbl/fixes"];
+    let sigma = |i: usize| said[i].vector("position_sigma")[0];
+    assert!(
+        (sigma(2) - 1.0).abs() < 0.1 && sigma(said.len() / 2) > 2.0,
+        "{} {}",
+        sigma(2),
+        sigma(said.len() / 2)
+    );
+    assert!(
+        (found["track"]["noise_scale"][0].as_f64().unwrap() - 1.0).abs() < 0.15,
+        "the noise is as stated"
+    );
+    let (_, covered) = dive.held_against(&output.topics["/usbl/track"]);
+    assert!((0.88..=1.0).contains(&covered), "{covered}");
 }
 
 #[test]
