@@ -1,21 +1,32 @@
-//! A simulation as an MCAP log that looks like a real one: tracks, channels of no concern, notes, and how it
-//! was made.
+//! Channels, metadata and attachments as an MCAP log that looks like a real one.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 
 use mcap::records::{MessageHeader, Metadata};
-use nalgebra::Vector3;
 use serde_json::{Value, json};
 
-use super::bystanders;
 use super::error::SimulateError;
-use super::scenario::{RecordingScenario, Scenario};
-use super::sensor_channel::sensor_channel;
-use super::sensors::SensorRecord;
-use super::{Simulation, simulate};
 use crate::time::Time;
+
+/// All that a log holds.
+pub(super) struct Recorded<'a> {
+    /// The run's name.
+    pub(super) name: &'a str,
+    /// The instant of release: the run's zero.
+    pub(super) release: Time,
+    /// When the recording began.
+    pub(super) begin: Time,
+    pub(super) profile: &'static str,
+    pub(super) chunk_bytes: u32,
+    pub(super) channels: Vec<Channel>,
+    /// What a real log wouldn't know.
+    pub(super) truth: BTreeMap<String, String>,
+    pub(super) notes: String,
+    /// The scenario that made it, TOML.
+    pub(super) scenario: String,
+}
 
 /// A channel and its messages, before they are put in order.
 pub(super) struct Channel {
@@ -65,61 +76,33 @@ impl Message {
     }
 }
 
-/// Simulates a scenario and writes its log.
+/// Writes a log: the same bytes for the same content.
 ///
 /// # Errors
-///
-/// Those of [`simulate`], before anything is written; [`SimulateError::Log`] where writing fails.
-pub fn write_log<W: Write + Seek>(scenario: &Scenario, writer: W) -> Result<Simulation, SimulateError> {
-    let simulation = simulate(scenario)?;
-    write_simulation(scenario, &simulation, writer)?;
-    Ok(simulation)
-}
-
-/// Writes the log of a simulation of `scenario`: the same bytes for the same arguments.
-///
-/// # Errors
-///
-/// [`SimulateError::Log`] where writing fails, [`SimulateError::Serialize`] for a scenario that TOML can't
-/// hold.
-pub fn write_simulation<W: Write + Seek>(
-    scenario: &Scenario,
-    simulation: &Simulation,
-    writer: W,
-) -> Result<(), SimulateError> {
-    let made_by = scenario.to_toml()?;
-    let release = Time::from_ns(scenario.epoch_ns);
-    let RecordingScenario { encoding, bystanders, .. } = scenario.recording;
-    let mut channels: Vec<Channel> =
-        simulation.sensors.iter().map(|sensor| sensor_channel(sensor, encoding, release)).collect();
-    if bystanders {
-        channels.extend(bystanders::channels(scenario, simulation));
-    }
-
+/// [`SimulateError::Log`] where writing fails.
+pub(super) fn write<W: Write + Seek>(recorded: Recorded, writer: W) -> Result<(), SimulateError> {
     let mut log = mcap::WriteOptions::new()
-        // the bystanders are in encodings of their own
-        .profile(if bystanders { "" } else { encoding.profile() })
+        .profile(recorded.profile)
         .library(concat!("trackfuse ", env!("CARGO_PKG_VERSION")))
-        .chunk_size(Some(u64::from(scenario.recording.chunk_bytes)))
+        .chunk_size(Some(u64::from(recorded.chunk_bytes)))
         .compression(Some(mcap::Compression::Zstd))
         .compression_threads(0) // so that the bytes don't depend on the machine
         .create(writer)?;
-    log.write_metadata(&trial(scenario))?;
-    log.write_metadata(&truth(scenario, simulation))?;
-    let begin = release.plus_seconds(-scenario.recording.lead_s);
+    log.write_metadata(&trial(recorded.name, recorded.release))?;
+    log.write_metadata(&Metadata { name: "simulation".into(), metadata: recorded.truth })?;
     for (name, media_type, text) in [
-        ("deployment_notes.txt", "text/plain", notes(simulation)),
-        ("scenario.toml", "application/toml", made_by),
+        ("deployment_notes.txt", "text/plain", recorded.notes),
+        ("scenario.toml", "application/toml", recorded.scenario),
     ] {
         log.attach(&mcap::Attachment {
-            log_time: begin.to_log(),
-            create_time: begin.to_log(),
+            log_time: recorded.begin.to_log(),
+            create_time: recorded.begin.to_log(),
             name: name.into(),
             media_type: media_type.into(),
             data: Cow::Owned(text.into_bytes()),
         })?;
     }
-    write_messages(&mut log, &channels)?;
+    write_messages(&mut log, &recorded.channels)?;
     log.finish()?;
     Ok(())
 }
@@ -172,6 +155,16 @@ pub(super) fn object_schema(title: &str, properties: &Value) -> Value {
     })
 }
 
+/// The schema of `{x, y, z}`.
+pub(super) fn vector_schema(description: &str) -> Value {
+    let number = || json!({ "type": "number" });
+    json!({
+        "type": "object",
+        "description": description,
+        "properties": { "x": number(), "y": number(), "z": number() },
+    })
+}
+
 /// The schema of an instant.
 pub(super) fn time_schema() -> Value {
     json!({
@@ -184,73 +177,23 @@ pub(super) fn time_schema() -> Value {
     })
 }
 
-fn record<const N: usize>(name: &str, entries: [(&str, String); N]) -> Metadata {
-    Metadata {
-        name: name.into(),
-        metadata: entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect(),
-    }
+/// Entries of a metadata record.
+pub(super) fn entries<const N: usize>(entries: [(&str, String); N]) -> BTreeMap<String, String> {
+    entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
 }
 
-fn trial(scenario: &Scenario) -> Metadata {
-    record(
-        "trial",
-        [
-            ("vessel", "R/V Example".into()),
-            ("operator", "simulated".into()),
-            ("site", "nowhere in particular".into()),
-            ("run", scenario.name.clone()),
-            ("release_ns", scenario.epoch_ns.to_string()),
-        ],
-    )
-}
-
-/// What a real log wouldn't know: phases, characteristic points and systematic errors.
-fn truth(scenario: &Scenario, simulation: &Simulation) -> Metadata {
-    let phases = &simulation.phases;
-    let mut entries = record(
-        "simulation",
-        [
-            ("name", scenario.name.clone()),
-            ("description", scenario.description.clone()),
-            ("seed", scenario.seed.to_string()),
-            ("epoch_ns", scenario.epoch_ns.to_string()),
-            ("t0_s", decimal(phases.t0_s)),
-            ("t1_s", decimal(phases.t1_s)),
-            ("t2_s", decimal(phases.t2_s)),
-            ("t3_s", decimal(phases.t3_s)),
-            ("overlap_begin_s", decimal(phases.overlap_begin_s)),
-            ("overlap_end_s", decimal(phases.overlap_end_s)),
-        ],
-    );
-    let map = &mut entries.metadata;
-    for (k, point) in (1..).zip(&simulation.characteristic_points) {
-        map.insert(format!("point_{k}_t_s"), decimal(point.t_s));
-        map.insert(format!("point_{k}_z_m"), decimal(point.z_m));
-        map.insert(format!("point_{k}_vz_m_s"), decimal(point.vz_m_s));
-    }
-    for SensorRecord { name, errors, .. } in &simulation.sensors {
-        let list = |v: &Vector3<f64>| format!("[{}, {}, {}]", decimal(v.x), decimal(v.y), decimal(v.z));
-        map.insert(format!("{name}_bias_m"), list(&errors.bias_m));
-        map.insert(format!("{name}_velocity_bias_m_s"), list(&errors.velocity_bias_m_s));
-        map.insert(format!("{name}_drift_m_s"), list(&errors.drift_m_s));
-        map.insert(format!("{name}_scale"), decimal(errors.scale));
-        map.insert(format!("{name}_clock_offset_s"), decimal(errors.clock_offset_s));
-    }
-    entries
+fn trial(run: &str, release: Time) -> Metadata {
+    let metadata = entries([
+        ("vessel", "R/V Example".into()),
+        ("operator", "simulated".into()),
+        ("site", "nowhere in particular".into()),
+        ("run", run.to_owned()),
+        ("release_ns", release.ns().to_string()),
+    ]);
+    Metadata { name: "trial".into(), metadata }
 }
 
 /// A number to nine decimals, so that the last bit of a platform's sines doesn't show.
-fn decimal(value: f64) -> String {
+pub(super) fn decimal(value: f64) -> String {
     round(value, 1e9).to_string()
-}
-
-fn notes(simulation: &Simulation) -> String {
-    let start = simulation.trajectory.at(0.0).position;
-    format!(
-        "Deployment notes\n\
-         Vehicle on the carrier at {:.0} m depth, tether gauge zeroed on the release point.\n\
-         Sea state 2, current below 0.1 m/s. Beacon interrogation started before release.\n\
-         This is a simulated trial: scenario.toml made it.\n",
-        -start.z
-    )
 }

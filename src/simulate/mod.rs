@@ -12,6 +12,7 @@
 mod band_noise;
 mod bystanders;
 mod climb;
+mod climb_log;
 mod climb_scenario;
 mod dive;
 mod error;
@@ -19,6 +20,7 @@ mod families;
 mod log;
 mod phases;
 mod scenario;
+mod scenario_file;
 mod sensor_channel;
 mod sensor_scenario;
 mod sensors;
@@ -29,13 +31,18 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 pub use climb::{ClimbConstants, Start, climb};
+pub use climb_log::{write_log, write_simulation};
 pub use climb_scenario::{ClimbScenario, Profile};
-pub use dive::{DiveConstants, SimulatedFix, UsblConstants, UsblRecord, dive, watch_by_usbl};
+pub use dive::{
+    DepthScenario, DiveConstants, DiveScenario, FixCounts, FixMessage, FixesAs, MessagesScenario, Seen,
+    SeenPolar, ShipScenario, ShipState, SimulatedDive, SimulatedFix, UsblConstants, UsblRecord, dive,
+    simulate_dive, watch_by_usbl, write_dive, write_dive_log,
+};
 pub use error::SimulateError;
 pub use families::FAMILIES;
-pub use log::{write_log, write_simulation};
 pub use phases::{Frames, Phases};
 pub use scenario::{RecordingScenario, Scenario};
+pub use scenario_file::ScenarioFile;
 pub use sensor_channel::SensorEncoding;
 pub use sensor_scenario::{ErrorsScenario, SensorScenario};
 pub use sensors::{SensorErrors, SensorRecord, SensorSample, Window, watch};

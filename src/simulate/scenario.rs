@@ -1,13 +1,14 @@
-//! What to simulate: every number of a run, each with a default, read from TOML and written to it.
+//! What climb to simulate: every number of a run, each with a default, read from TOML and written to it.
 
 use serde::{Deserialize, Serialize};
 
 use super::climb_scenario::ClimbScenario;
 use super::error::SimulateError;
+use super::scenario_file::read;
 use super::sensor_channel::SensorEncoding;
 use super::sensor_scenario::{ErrorsScenario, SensorScenario};
 
-/// A run to simulate. Same scenario, same log, to the byte.
+/// A climb to simulate. Same scenario, same log, to the byte.
 ///
 /// Read it by [`Scenario::from_toml`]: there, a sensor's missing keys get that sensor's defaults.
 /// Deserialized by itself, every sensor table that is given in part would get the tether's.
@@ -111,11 +112,7 @@ impl Scenario {
     /// [`SimulateError::Parse`] for text that isn't a scenario, with the line and the key; the errors of
     /// [`Scenario::validate`] for one that makes no sense.
     pub fn from_toml(text: &str) -> Result<Self, SimulateError> {
-        // Strictly and from the text first, so that what is wrong is named with its line.
-        toml::from_str::<Self>(text).map_err(Box::new)?;
-        let mut keys = toml::Table::try_from(Self::default()).map_err(Box::new)?;
-        overlay(&mut keys, toml::from_str(text).map_err(Box::new)?);
-        let scenario: Self = keys.try_into().map_err(Box::new)?;
+        let scenario: Self = read(text)?;
         scenario.validate()?;
         Ok(scenario)
     }
@@ -127,17 +124,5 @@ impl Scenario {
     /// [`SimulateError::Serialize`] where the seed is past the integers of TOML.
     pub fn to_toml(&self) -> Result<String, SimulateError> {
         Ok(toml::to_string(self).map_err(Box::new)?)
-    }
-}
-
-/// Puts the keys of `top` over those of `base`, table by table.
-fn overlay(base: &mut toml::Table, top: toml::Table) {
-    for (key, value) in top {
-        match (base.get_mut(&key), value) {
-            (Some(toml::Value::Table(base)), toml::Value::Table(top)) => overlay(base, top),
-            (_, value) => {
-                base.insert(key, value);
-            }
-        }
     }
 }

@@ -7,13 +7,13 @@ use prost::Message as _;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::log::{Channel, Message, Schema, object_schema, round, time_schema};
+use super::log::{Channel, Message, Schema, object_schema, round, time_schema, vector_schema};
 use super::sensors::{SensorRecord, SensorSample};
 use crate::publish::{Stamp, Xyz, cdr};
 use crate::time::Time;
 
 /// The frame of all positions: east, north, up.
-const FRAME: &str = "enu";
+pub(super) const FRAME: &str = "enu";
 
 /// What the sensors' messages are encoded in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -130,21 +130,13 @@ fn rounded(v: &Vector3<f64>) -> [f64; 3] {
 }
 
 fn track_schema() -> Value {
-    let vector = |description: &str| {
-        let number = || json!({ "type": "number" });
-        json!({
-            "type": "object",
-            "description": description,
-            "properties": { "x": number(), "y": number(), "z": number() },
-        })
-    };
     object_schema(
         "trackfuse.TrackSample",
         &json!({
             "timestamp": time_schema(),
             "frame_id": { "type": "string", "description": "frame of position and velocity" },
-            "position": vector("position in m; z = 0 is the sea's surface"),
-            "velocity": vector("velocity in m/s"),
+            "position": vector_schema("position in m; z = 0 is the sea's surface"),
+            "velocity": vector_schema("velocity in m/s"),
         }),
     )
 }

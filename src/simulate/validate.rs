@@ -6,17 +6,17 @@ use super::scenario::{RecordingScenario, Scenario};
 use super::sensor_scenario::{ErrorsScenario, SensorScenario};
 
 /// Most samples of one sensor, and messages of one other channel: three hours at 100 Hz.
-const MAX_SAMPLES: f64 = 1e6;
+pub(super) const MAX_SAMPLES: f64 = 1e6;
 /// Most frames of a climb: 17 minutes of a steep one.
 const MAX_FRAMES: f64 = 5e4;
 /// Most bytes of sonar pings.
 const MAX_SONAR_BYTES: f64 = 1e9;
 
 /// One table's keys, with its name for the messages.
-struct Table<'a>(&'a str);
+pub(super) struct Table<'a>(pub(super) &'a str);
 
 impl Table<'_> {
-    fn within(&self, key: &str, value: f64, low: f64, high: f64) -> Result<(), SimulateError> {
+    pub(super) fn within(&self, key: &str, value: f64, low: f64, high: f64) -> Result<(), SimulateError> {
         if (low..=high).contains(&value) {
             return Ok(());
         }
@@ -24,11 +24,17 @@ impl Table<'_> {
         Err(SimulateError::OutOfRange { key, value, low, high })
     }
 
-    fn all_within(&self, ranges: &[(&str, f64, f64, f64)]) -> Result<(), SimulateError> {
+    pub(super) fn all_within(&self, ranges: &[(&str, f64, f64, f64)]) -> Result<(), SimulateError> {
         ranges.iter().try_for_each(|&(key, value, low, high)| self.within(key, value, low, high))
     }
 
-    fn ordered(&self, key: &str, low: f64, high_key: &str, high: f64) -> Result<(), SimulateError> {
+    pub(super) fn ordered(
+        &self,
+        key: &str,
+        low: f64,
+        high_key: &str,
+        high: f64,
+    ) -> Result<(), SimulateError> {
         if low <= high {
             return Ok(());
         }
@@ -36,7 +42,21 @@ impl Table<'_> {
         Err(SimulateError::Reversed { key: name(key), high_key: name(high_key), low, high })
     }
 
-    fn at_most(&self, what: &'static str, value: f64, limit: f64) -> Result<(), SimulateError> {
+    /// Both ends of a range, and their order.
+    pub(super) fn range(
+        &self,
+        key: &str,
+        [from, to]: [f64; 2],
+        low: f64,
+        high: f64,
+    ) -> Result<(), SimulateError> {
+        let [first, second] = [0, 1].map(|i| format!("{key}[{i}]"));
+        self.within(&first, from, low, high)?;
+        self.within(&second, to, low, high)?;
+        self.ordered(&first, from, &second, to)
+    }
+
+    pub(super) fn at_most(&self, what: &'static str, value: f64, limit: f64) -> Result<(), SimulateError> {
         if value <= limit {
             return Ok(());
         }
@@ -52,17 +72,21 @@ impl Scenario {
     /// [`SimulateError::OutOfRange`] with the key and its range, [`SimulateError::Reversed`] for a range
     /// whose ends are swapped, [`SimulateError::TooLarge`] for more samples than a log should hold.
     pub fn validate(&self) -> Result<(), SimulateError> {
-        Table("").within("epoch_ns", self.epoch_ns as f64, 1e15, 4e18)?;
+        epoch(self.epoch_ns)?;
         climb(&Table("climb"), &self.climb)?;
         let t3_s = self.climb.phases().t3_s;
         for (name, scenario) in
             [("tether", &self.tether), ("beacon", &self.beacon), ("reference", &self.reference)]
         {
-            sensor(&Table(name), scenario, t3_s)?;
-            errors(&Table(&format!("{name}.errors")), &scenario.errors)?;
+            sensor(name, scenario, t3_s)?;
         }
         recording(&Table("recording"), &self.recording, t3_s)
     }
+}
+
+/// The instant of release.
+pub(super) fn epoch(epoch_ns: i64) -> Result<(), SimulateError> {
+    Table("").within("epoch_ns", epoch_ns as f64, 1e15, 4e18)
 }
 
 fn climb(table: &Table, climb: &ClimbScenario) -> Result<(), SimulateError> {
@@ -98,7 +122,9 @@ fn climb(table: &Table, climb: &ClimbScenario) -> Result<(), SimulateError> {
     table.ordered("random_low_hz", c.random_low_hz, "random_high_hz", c.random_high_hz)
 }
 
-fn sensor(table: &Table, sensor: &SensorScenario, t3_s: f64) -> Result<(), SimulateError> {
+/// A sensor's keys, its errors' too; it sees the vehicle up to `t3_s`.
+pub(super) fn sensor(name: &str, sensor: &SensorScenario, t3_s: f64) -> Result<(), SimulateError> {
+    let table = &Table(name);
     let (begin_s, end_s) = (sensor.begin_s.unwrap_or(0.0), sensor.end_s.unwrap_or(t3_s));
     table.all_within(&[
         ("rate_hz", sensor.rate_hz, 0.01, 10_000.0),
@@ -120,7 +146,8 @@ fn sensor(table: &Table, sensor: &SensorScenario, t3_s: f64) -> Result<(), Simul
     ])?;
     table.ordered("outlier_min_m", sensor.outlier_min_m, "outlier_max_m", sensor.outlier_max_m)?;
     table.ordered("begin_s", begin_s, "end_s", end_s)?;
-    table.at_most("samples", (end_s - begin_s) * sensor.rate_hz, MAX_SAMPLES)
+    table.at_most("samples", (end_s - begin_s) * sensor.rate_hz, MAX_SAMPLES)?;
+    errors(&Table(&format!("{name}.errors")), &sensor.errors)
 }
 
 fn errors(table: &Table, errors: &ErrorsScenario) -> Result<(), SimulateError> {

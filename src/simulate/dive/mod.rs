@@ -16,23 +16,36 @@
 //! A manned submersible's numbers: it sinks and rises by ballast at 0.6 to 0.75 m/s (36 to 45 m a minute), cruises at
 //! 1 to 2 knots, turns at 1 to 3 degrees a second, and follows within half a minute.
 
+mod log;
+mod messages;
+mod scenario;
+mod ship;
+mod simulation;
 mod usbl;
+mod validate;
 
 use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
 
 use super::trajectory::{State, Trajectory};
 
+pub use log::{write_dive, write_dive_log};
+pub use messages::{FixMessage, Seen};
+pub use scenario::{DepthScenario, DiveScenario, FixesAs, MessagesScenario, ShipScenario};
+pub use ship::{SeenPolar, ShipState};
+pub use simulation::{FixCounts, SimulatedDive, simulate_dive};
 pub use usbl::{SimulatedFix, UsblConstants, UsblRecord, watch_by_usbl};
 
 /// Step of the truth's table, s: a tenth of the shortest time in (1).
 const STEP_S: f64 = 0.5;
 
 /// The ranges that a dive's numbers are drawn from, evenly.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct DiveConstants {
     /// How long the whole dive takes, s.
     pub duration_s: f64,
@@ -42,16 +55,16 @@ pub struct DiveConstants {
     pub vertical_m_s: [f64; 2],
     /// Horizontal speed through the water while descending or ascending, m/s.
     pub gliding_m_s: [f64; 2],
-    /// Rate of the slow spiral on the way down and up, rad/s, to either side.
-    pub spiral_rad_s: [f64; 2],
+    /// Rate of the slow spiral on the way down and up, degrees/s, to either side.
+    pub spiral_deg_s: [f64; 2],
     /// Speed on a leg, m/s.
     pub leg_m_s: [f64; 2],
     /// How long a leg takes, s.
     pub leg_s: [f64; 2],
-    /// Angle between two legs, rad, to either side.
-    pub turn_rad: [f64; 2],
-    /// Rate of a turn, rad/s.
-    pub turn_rad_s: [f64; 2],
+    /// Angle between two legs, degrees, to either side.
+    pub turn_deg: [f64; 2],
+    /// Rate of a turn, degrees/s.
+    pub turn_deg_s: [f64; 2],
     /// Climb or descent along a leg, where the bottom slopes, m/s, to either side.
     pub slope_m_s: [f64; 2],
     /// T, s: horizontal, vertical.
@@ -69,11 +82,11 @@ impl Default for DiveConstants {
             vertical_share: [0.25, 0.33],
             vertical_m_s: [0.60, 0.75],
             gliding_m_s: [0.05, 0.25],
-            spiral_rad_s: [0.0, 0.004],
+            spiral_deg_s: [0.0, 0.004_f64.to_degrees()],
             leg_m_s: [0.5, 1.0],
             leg_s: [180.0, 420.0],
-            turn_rad: [30.0_f64.to_radians(), 135.0_f64.to_radians()],
-            turn_rad_s: [1.0_f64.to_radians(), 3.0_f64.to_radians()],
+            turn_deg: [30.0, 135.0],
+            turn_deg_s: [1.0, 3.0],
             slope_m_s: [0.0, 0.10],
             lag_s: [15.0, 25.0],
             current_m_s: [0.05, 0.015],
@@ -93,6 +106,11 @@ fn either_side(range: [f64; 2], rng: &mut impl Rng) -> f64 {
     sign * within(range, rng)
 }
 
+/// A range of angles, in radians.
+fn radians(range_deg: [f64; 2]) -> [f64; 2] {
+    range_deg.map(f64::to_radians)
+}
+
 /// What is steered for a while: speed ahead, rate of turn, speed upwards.
 #[expect(clippy::struct_field_names, reason = "units stand in names")]
 struct Order {
@@ -109,7 +127,7 @@ fn orders(constants: &DiveConstants, rng: &mut impl Rng) -> Vec<Order> {
     let mut vertical = |until_s, sign: f64| Order {
         until_s,
         ahead_m_s: within(c.gliding_m_s, rng),
-        turn_rad_s: either_side(c.spiral_rad_s, rng),
+        turn_rad_s: either_side(radians(c.spiral_deg_s), rng),
         up_m_s: sign * within(c.vertical_m_s, rng),
     };
     let (down, up) = (vertical(down_s, -1.0), vertical(c.duration_s, 1.0));
@@ -119,7 +137,7 @@ fn orders(constants: &DiveConstants, rng: &mut impl Rng) -> Vec<Order> {
         let (ahead_m_s, up_m_s) = (within(c.leg_m_s, rng), either_side(c.slope_m_s, rng));
         now_s += within(c.leg_s, rng);
         orders.push(Order { until_s: now_s.min(survey_end_s), ahead_m_s, turn_rad_s: 0.0, up_m_s });
-        let (angle, rate) = (either_side(c.turn_rad, rng), within(c.turn_rad_s, rng));
+        let (angle, rate) = (either_side(radians(c.turn_deg), rng), within(radians(c.turn_deg_s), rng));
         now_s += angle.abs() / rate;
         let turn_rad_s = rate.copysign(angle);
         orders.push(Order { until_s: now_s.min(survey_end_s), ahead_m_s, turn_rad_s, up_m_s: 0.0 });

@@ -5,12 +5,14 @@ use std::f64::consts::TAU;
 use nalgebra::Vector3;
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
 
 use crate::sample::Sample;
 use crate::simulate::trajectory::Trajectory;
 
 /// How a dive is watched.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct UsblConstants {
     /// Time from exchange to exchange, s.
     pub cycle_s: f64,
