@@ -6,7 +6,7 @@ use crate::cli::Addition;
 use crate::config::{Config, Output};
 use crate::estimate::usbl::Warning;
 use crate::fusion;
-use crate::log::{Appender, Encoding, Log, LogError, bad_chunks};
+use crate::log::{Appender, Encoding, Log, LogError, bad_chunks, passed_over};
 use crate::math::geodesy::{Geodetic, LocalFrame};
 use crate::publish::{Context, Stream, Topic, fix_messages, messages, track_messages, usbl_fix_messages};
 use crate::report::{UsblParts, UsblReport, html, render_usbl};
@@ -31,6 +31,7 @@ pub fn usbl(args: &Addition) -> Result<Outcome, CommandError> {
     html_report::check(args, &log, &destination)?;
 
     let mut damaged = choose_fixes(&log, &mut config)?;
+    warnings.extend(passed_over(&damaged));
     let path = config.usbl.fix.clone().unwrap_or_default();
     let input = source::load_dive(&log, &path, &config.usbl, config.output.origin)?;
     let DiveSamples { fixes: mut loaded, heights, origin, warnings: said, read } = input;
@@ -40,6 +41,12 @@ pub fn usbl(args: &Addition) -> Result<Outcome, CommandError> {
     config.output.origin = config.output.origin.or(loaded.fix_origin);
     let fixes = std::mem::take(&mut loaded.source);
     let geodetic = config.output.origin.map(|place| LocalFrame::new(Geodetic::from_degrees(place)));
+    let topics = Topic::written(&Topic::USBL, encoding, geodetic.is_some());
+    let channels = Topic::channels(&topics, config.output.prefix(), encoding);
+    let compression = config.output.compression;
+    let begin = || Appender::begin(&log, &destination, &channels, compression);
+    // a new file's copy of the log gets on meanwhile; the log itself is not touched before it must be
+    let begun = if args.in_place { None } else { Some(begin()?) };
     bar.doing("cleaning");
     let plan = resolve::dive_plan(&mut config, &loaded, &fixes, origin)?;
     let dive = fusion::usbl::clean(&fixes, &loaded.late, &heights, &plan)?;
@@ -74,8 +81,6 @@ pub fn usbl(args: &Addition) -> Result<Outcome, CommandError> {
     });
     let text = render_usbl(&report);
 
-    let topics = Topic::written(&Topic::USBL, encoding, geodetic.is_some());
-    let channels = Topic::channels(&topics, config.output.prefix(), encoding);
     let kept = std::slice::from_ref(&dive.kept);
     let context = Context {
         sources: kept,
@@ -92,7 +97,7 @@ pub fn usbl(args: &Addition) -> Result<Outcome, CommandError> {
     let page = html_report::prepare(args, &metadata, |provenance, config| {
         html::usbl::page(parts, provenance, config)
     })?;
-    let mut appender = Appender::begin(&log, &destination, &channels, config.output.compression)?;
+    let mut appender = begun.map_or_else(begin, Ok)?;
     appender.leave_out(bad_chunks(&damaged));
     bar.doing("writing the track");
     let judged = usbl_fix_messages(&fixes.positions, &dive.cleaned.judged, &plan.frame_id, context);
