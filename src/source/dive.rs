@@ -1,8 +1,9 @@
 //! What a USBL system saw of a dive, in one pass over the log: fixes in whatever shape, the ship, the depth.
 
+use super::SourceError;
+use super::gathered::{Gathered, Kind};
 use super::load::{Loaded, Readers, SigmaOrigin, lack};
 use super::numbers::Numbers;
-use super::{Gathered, SourceError};
 use crate::config::{AngleUnit, SourceConfig, Usbl};
 use crate::estimate::usbl::geometry::{self, Polar};
 use crate::estimate::usbl::ship::ShipTrack;
@@ -53,7 +54,7 @@ pub fn load_dive(
         position_sigma_m: usbl.sigma_m,
         ..common.clone()
     })?];
-    sources[0].polar = Some(usbl.angles);
+    sources[0].kind = Kind::Acoustic(usbl.angles);
     if usbl.ship.is_some() {
         let (position, position_sigma_m) = (usbl.ship.clone(), usbl.ship_sigma_m);
         sources.push(Gathered::new(&SourceConfig {

@@ -32,8 +32,16 @@ pub(super) struct Gathered {
     first_fault: [Option<Fault>; 2],
     farthest_back_s: f64,
     pub(super) untimed: usize,
-    /// Whether its positions may be ranges, bearings and depressions, and the unit of their angles.
-    pub(super) polar: Option<Option<AngleUnit>>,
+    pub(super) kind: Kind,
+}
+
+/// What a source's messages may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Those of a sensor that follows the vehicle.
+    Track,
+    /// Those of an acoustic system, which may come late, and may be ranges, bearings and depressions in this unit.
+    Acoustic(Option<AngleUnit>),
 }
 
 impl Gathered {
@@ -60,7 +68,7 @@ impl Gathered {
             first_fault: [None, None],
             farthest_back_s: 0.0,
             untimed: 0,
-            polar: None,
+            kind: Kind::Track,
         })
     }
 
@@ -302,7 +310,7 @@ impl Gathered {
                  `time` for this source"
             ));
         }
-        if self.farthest_back_s > BACKWARD_S {
+        if self.farthest_back_s > BACKWARD_S && self.kind == Kind::Track {
             warnings.push(format!(
                 "{name}: times go back by up to {:.1} s from one message to the next",
                 self.farthest_back_s

@@ -167,7 +167,7 @@ impl Readers {
             for channel in channels {
                 readers.push((
                     channel.id,
-                    Reader::new(&source.config, &source.paths, index, channel, source.polar)?,
+                    Reader::new(&source.config, &source.paths, index, channel, source.kind)?,
                 ));
             }
         }

@@ -23,7 +23,6 @@ mod usbl;
 pub use candidate::{Candidate, Judged, Judgement, Unfit, judge};
 pub use dive::{DiveSamples, load_dive};
 pub use events::{RecordedEvent, recorded_events};
-use gathered::Gathered;
 pub use glimpse::{Glimpse, glimpse};
 pub use load::{Loaded, Samples, SigmaOrigin, Timing, datum, load};
 pub use propose::{Proposal, propose, propose_chosen};

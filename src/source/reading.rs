@@ -2,8 +2,9 @@
 
 use super::SourceError;
 use super::fix::{covariance_is_unknown, fix};
+use super::gathered::Kind;
 use super::polar::polar;
-use crate::config::{AngleUnit, Axes, SourceConfig, TimeChoice, VelocityFrame};
+use crate::config::{Axes, SourceConfig, TimeChoice, VelocityFrame};
 use crate::log::decode::{DecodeError, Decoder, MessagePath, PathMiss, Step, Value};
 use crate::log::{Channel, Index, Message};
 use crate::math::geodesy::Geodetic;
@@ -108,8 +109,7 @@ pub(super) struct Reader {
     latency_s: f64,
     axes: Axes,
     offset_m: [f64; 3],
-    /// Whether a position may be a range, bearing and depression, and the unit of its angles.
-    polar: Option<Option<AngleUnit>>,
+    kind: Kind,
 }
 
 /// Where the messages of a topic keep their time.
@@ -171,7 +171,7 @@ impl Reader {
         paths: &[(Quantity, MessagePath)],
         index: &Index,
         channel: &Channel,
-        polar: Option<Option<AngleUnit>>,
+        kind: Kind,
     ) -> Result<Self, SourceError> {
         let schema = index.schema_of(channel);
         let (encoding, schema_name, data) =
@@ -221,7 +221,7 @@ impl Reader {
             latency_s: config.latency_s,
             axes: config.axes,
             offset_m: config.offset_m,
-            polar,
+            kind,
         })
     }
 
@@ -251,7 +251,9 @@ impl Reader {
             let sigma = sigma.filter(|_| !covariance_is_unknown(at));
             return Ok(Reading { time, value: Measured::Fix(place?), sigma, offset_is_turned: false });
         }
-        if let Some(measured) = self.polar.and_then(|unit| polar(at, unit)) {
+        if let Kind::Acoustic(unit) = self.kind
+            && let Some(measured) = polar(at, unit)
+        {
             let value = Measured::Polar(measured?);
             return Ok(Reading { time, value, sigma: None, offset_is_turned: false });
         }
