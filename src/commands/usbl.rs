@@ -3,20 +3,16 @@
 use super::progress::Bar;
 use super::{CommandError, Outcome, addition, html_report, say};
 use crate::cli::Addition;
-use crate::config::{Config, Output, SourceConfig};
-use crate::estimate::usbl::{Height, Warning};
+use crate::config::{Config, Output};
+use crate::estimate::usbl::Warning;
 use crate::fusion;
-use crate::log::{Appender, Encoding, Log, LogError, bad_chunks};
+use crate::log::{Appender, Encoding, Log, LogError, bad_chunks, passed_over};
 use crate::math::geodesy::{Geodetic, LocalFrame};
 use crate::publish::{Context, Stream, Topic, fix_messages, messages, track_messages, usbl_fix_messages};
 use crate::report::{UsblParts, UsblReport, html, render_usbl};
 use crate::resolve;
-use crate::sample::Source;
-use crate::source::{self, Loaded, Samples, SigmaOrigin};
+use crate::source::{self, DiveSamples, SigmaOrigin};
 use crate::time::Time;
-
-/// What the fixes are called.
-const NAME: &str = "usbl";
 
 /// Cleans a USBL system's fixes and writes the track, a prediction and every fix's verdict beside them.
 ///
@@ -35,16 +31,22 @@ pub fn usbl(args: &Addition) -> Result<Outcome, CommandError> {
     html_report::check(args, &log, &destination)?;
 
     let mut damaged = choose_fixes(&log, &mut config)?;
-    let asked = [source_of(&config)];
-    let Samples { mut loaded, origin, left_out, read } =
-        source::load(&log, &asked, true, config.output.origin)?;
+    warnings.extend(passed_over(&damaged));
+    let path = config.usbl.fix.clone().unwrap_or_default();
+    let input = source::load_dive(&log, &path, &config.usbl, config.output.origin)?;
+    let DiveSamples { fixes: mut loaded, heights, origin, warnings: said, read } = input;
     damaged.extend(read.damaged);
-    let (mut loaded, fixes) = only(&mut loaded)?;
-    let heights = heights(&log, &config, origin, &mut damaged, &mut warnings)?;
     addition::ensure_whole(&mut damaged, &log, args)?;
-    warnings.extend(left_out.into_iter().filter(|sentence| !warnings.contains(sentence)).collect::<Vec<_>>());
-    let fixes = at_sea_level(fixes, &mut loaded, &mut config);
+    warnings.extend(said.into_iter().filter(|sentence| !warnings.contains(sentence)).collect::<Vec<_>>());
+    config.output.origin = config.output.origin.or(loaded.fix_origin);
+    let fixes = std::mem::take(&mut loaded.source);
     let geodetic = config.output.origin.map(|place| LocalFrame::new(Geodetic::from_degrees(place)));
+    let topics = Topic::written(&Topic::USBL, encoding, geodetic.is_some());
+    let channels = Topic::channels(&topics, config.output.prefix(), encoding);
+    let compression = config.output.compression;
+    let begin = || Appender::begin(&log, &destination, &channels, compression);
+    // a new file's copy of the log gets on meanwhile; the log itself is not touched before it must be
+    let begun = if args.in_place { None } else { Some(begin()?) };
     bar.doing("cleaning");
     let plan = resolve::dive_plan(&mut config, &loaded, &fixes, origin)?;
     let dive = fusion::usbl::clean(&fixes, &loaded.late, &heights, &plan)?;
@@ -79,8 +81,6 @@ pub fn usbl(args: &Addition) -> Result<Outcome, CommandError> {
     });
     let text = render_usbl(&report);
 
-    let topics = Topic::written(&Topic::USBL, encoding, geodetic.is_some());
-    let channels = Topic::channels(&topics, config.output.prefix(), encoding);
     let kept = std::slice::from_ref(&dive.kept);
     let context = Context {
         sources: kept,
@@ -97,7 +97,7 @@ pub fn usbl(args: &Addition) -> Result<Outcome, CommandError> {
     let page = html_report::prepare(args, &metadata, |provenance, config| {
         html::usbl::page(parts, provenance, config)
     })?;
-    let mut appender = Appender::begin(&log, &destination, &channels, config.output.compression)?;
+    let mut appender = begun.map_or_else(begin, Ok)?;
     appender.leave_out(bad_chunks(&damaged));
     bar.doing("writing the track");
     let judged = usbl_fix_messages(&fixes.positions, &dive.cleaned.judged, &plan.frame_id, context);
@@ -123,62 +123,4 @@ fn choose_fixes(log: &Log, config: &mut Config) -> Result<Vec<LogError>, Command
     let (path, damaged) = source::usbl_fix(log)?;
     config.usbl.fix = Some(path);
     Ok(damaged)
-}
-
-/// The fixes as any source is configured.
-fn source_of(config: &Config) -> SourceConfig {
-    let usbl = &config.usbl;
-    SourceConfig {
-        name: NAME.into(),
-        position: usbl.fix.clone(),
-        axes: usbl.axes,
-        time: usbl.time,
-        latency_s: usbl.latency_s,
-        position_sigma_m: usbl.sigma_m,
-        datum: true,
-        ..SourceConfig::default()
-    }
-}
-
-/// The one source that was loaded, and its samples.
-fn only(loaded: &mut Vec<Loaded>) -> Result<(Loaded, Source), CommandError> {
-    let nothing = source::SourceError::Empty { name: NAME.into(), topic: NAME.into() };
-    let mut loaded = loaded.pop().ok_or(nothing)?;
-    let fixes = std::mem::take(&mut loaded.source);
-    Ok((loaded, fixes))
-}
-
-/// The depth channel's heights, where one is named.
-fn heights(
-    log: &Log,
-    config: &Config,
-    origin: Time,
-    damaged: &mut Vec<LogError>,
-    warnings: &mut Vec<String>,
-) -> Result<Vec<Height>, CommandError> {
-    let Some(path) = &config.usbl.depth else { return Ok(Vec::new()) };
-    let depth = source::load_scalar(log, "depth", path, None)?;
-    damaged.extend(depth.damaged);
-    if depth.left_out > 0 {
-        warnings
-            .push(format!("depth: {} messages are left out: no finite number at the path", depth.left_out));
-    }
-    let height = |&(time, depth_m): &(Time, f64)| Height {
-        time_s: time.seconds_since(origin),
-        z_m: -depth_m,
-        sigma_m: config.usbl.depth_sigma_m,
-    };
-    Ok(depth.values.iter().map(height).collect())
-}
-
-/// Latitudes and longitudes count from altitude 0, unless the config says otherwise: z = 0 is then the surface.
-fn at_sea_level(mut fixes: Source, loaded: &mut Loaded, config: &mut Config) -> Source {
-    let (None, Some([latitude, longitude, altitude_m])) = (config.output.origin, loaded.fix_origin) else {
-        return fixes;
-    };
-    // an origin straight below has the same axes
-    fixes.positions.iter_mut().for_each(|fix| fix.value[2] += altitude_m);
-    let origin = [latitude, longitude, 0.0];
-    (config.output.origin, loaded.fix_origin) = (Some(origin), Some(origin));
-    fixes
 }

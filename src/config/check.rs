@@ -56,6 +56,19 @@ impl Config {
         let usbl = &self.usbl;
         positive("usbl.sigma_m", usbl.sigma_m)?;
         positive("usbl.depth_sigma_m", Some(usbl.depth_sigma_m))?;
+        positive("usbl.range_sigma_m", Some(usbl.range_sigma_m))?;
+        positive("usbl.angle_sigma_deg", Some(usbl.angle_sigma_deg))?;
+        positive("usbl.heading_sigma_deg", Some(usbl.heading_sigma_deg))?;
+        positive("usbl.ship_sigma_m", usbl.ship_sigma_m)?;
+        let share_ok = (0.0..1.0).contains(&usbl.sigma_of_range);
+        range(share_ok, "usbl.sigma_of_range".into(), usbl.sigma_of_range.to_string(), "0 to 1")?;
+        let has_ship = usbl.ship.is_some() || usbl.sigma_of_range == 0.0;
+        range(
+            has_ship,
+            "usbl.sigma_of_range".into(),
+            usbl.sigma_of_range.to_string(),
+            "0 without `usbl.ship`",
+        )?;
         positive("usbl.speed_limit_m_s", Some(usbl.speed_limit_m_s))?;
         positive("usbl.cycle_s", usbl.cycle_s)?;
         let latency_ok = usbl.latency_s.is_finite();

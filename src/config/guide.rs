@@ -14,7 +14,7 @@ A TOML file for `trackfuse fuse LOG --config FILE`. Every key may be left out; w
 writes a config with the sources of that log and all other keys as comments, and is the way to begin. An unknown key is an error that names the
 nearest known one. `fuse` keeps the config in its output, every default resolved, in the metadata record `trackfuse:PREFIX`.
 
-Units stand in the keys: `_m` is metres, `_s` seconds, `_m_s` metres a second, `_hz` hertz, `_ns` nanoseconds, `_rad` radians. Sigmas are one
+Units stand in the keys: `_m` is metres, `_s` seconds, `_m_s` metres a second, `_hz` hertz, `_ns` nanoseconds, `_rad` radians, `_deg` degrees. Sigmas are one
 standard deviation.
 
 ```toml
@@ -111,7 +111,15 @@ fn takes(schema: &Value, property: &Value) -> String {
 
 /// The unit that a key's name ends with.
 fn unit(key: &str) -> String {
-    let units = [("_m_s", "m/s"), ("_m", "m"), ("_hz", "Hz"), ("_ns", "ns"), ("_rad", "rad"), ("_s", "s")];
+    let units = [
+        ("_m_s", "m/s"),
+        ("_m", "m"),
+        ("_hz", "Hz"),
+        ("_ns", "ns"),
+        ("_rad", "rad"),
+        ("_deg", "degrees"),
+        ("_s", "s"),
+    ];
     let unit = units.iter().find(|(ending, _)| key.ends_with(ending)).map_or("", |(_, unit)| unit);
     if key == "origin" { "degrees, degrees, m".into() } else { unit.into() }
 }

@@ -10,7 +10,7 @@ mod template;
 mod usbl;
 
 pub use template::{SourceTable, template};
-pub use usbl::{Causal, Usbl};
+pub use usbl::{AngleUnit, Causal, Usbl};
 
 use std::path::{Path, PathBuf};
 

@@ -101,6 +101,7 @@ fn unusable(judged: &Judged) -> Option<Unusable> {
         Unfit::Silent => "no messages",
         Unfit::Unreadable => "no message can be read",
         Unfit::NoVector(_) => "no position",
+        Unfit::Polar => "seen from a ship",
     };
     Some(Unusable { short: short.into(), reason: unfit.to_string() })
 }

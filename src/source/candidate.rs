@@ -5,6 +5,7 @@ use std::fmt;
 
 use super::SourceError;
 use super::fix::fix;
+use super::polar::is_polar;
 use super::topic::{is_reference, sensor_word, vector_is};
 use crate::log::decode::{Decoder, MessagePath, Value};
 use crate::log::{Channel, Index, Log, LogError};
@@ -87,6 +88,11 @@ pub enum Unfit {
     /// No message of it was found, and parts of the log can't be read.
     #[error("no message of it can be read: parts of the log can't be")]
     Unreadable,
+    /// It is seen from a ship, which `trackfuse usbl` can place.
+    #[error(
+        "range, bearing and depression: `trackfuse usbl` takes them, with the ship's position and heading"
+    )]
+    Polar,
     /// Its messages hold no vector where one is looked for; the names of their first fields.
     #[error("no position or velocity in {0}")]
     NoVector(String),
@@ -242,6 +248,8 @@ fn fit(topic: &str, message: &Value) -> Result<Candidate, Unfit> {
     let (position, velocity) = (path_of(Quantity::Position).or_else(place), path_of(Quantity::Velocity));
     if position.is_some() || velocity.is_some() {
         Ok(Candidate { topic: topic.to_owned(), position, velocity })
+    } else if is_polar(message) {
+        Err(Unfit::Polar)
     } else {
         Err(Unfit::NoVector(fields_of(message)))
     }
@@ -272,6 +280,6 @@ fn absent_at(value: &Value, fields: &str) -> bool {
 }
 
 /// The topic as a path begins with it.
-fn quoted(topic: &str) -> String {
+pub(super) fn quoted(topic: &str) -> String {
     MessagePath { topic: topic.to_owned(), steps: Vec::new() }.to_string()
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::SourceError;
 use super::load::{Loaded, SigmaOrigin, Timing};
 use super::reading::{Clock, Fault, Measured, Outcome, Reading, sum};
-use crate::config::SourceConfig;
+use crate::config::{AngleUnit, SourceConfig};
 use crate::estimate::noise;
 use crate::log::decode::{DecodeError, MessagePath};
 use crate::math::geodesy::{Geodetic, LocalFrame};
@@ -32,6 +32,16 @@ pub(super) struct Gathered {
     first_fault: [Option<Fault>; 2],
     farthest_back_s: f64,
     pub(super) untimed: usize,
+    pub(super) kind: Kind,
+}
+
+/// What a source's messages may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Those of a sensor that follows the vehicle.
+    Track,
+    /// Those of an acoustic system, which may come late, and may be ranges, bearings and depressions in this unit.
+    Acoustic(Option<AngleUnit>),
 }
 
 impl Gathered {
@@ -58,6 +68,7 @@ impl Gathered {
             first_fault: [None, None],
             farthest_back_s: 0.0,
             untimed: 0,
+            kind: Kind::Track,
         })
     }
 
@@ -117,6 +128,14 @@ impl Gathered {
                     let path = path.to_string();
                     return Some((Some(*quantity), SourceError::NoOrientation { name, path }));
                 }
+                Some(Fault::NoUnit) => {
+                    let path = path.to_string();
+                    return Some((Some(*quantity), SourceError::NoUnit { name, path }));
+                }
+                Some(Fault::NoAngle) => {
+                    let (path, count) = (path.to_string(), self.messages);
+                    return Some((Some(*quantity), SourceError::NotAngles { name, path, count }));
+                }
                 Some(Fault::NoVector { kind, fits }) => (kind, fits),
                 Some(fault) => (fault.description().unwrap_or_default(), Vec::new()),
                 None => {
@@ -164,9 +183,23 @@ impl Gathered {
     pub(super) fn first_fix(&self) -> Option<[f64; 3]> {
         let fixes = self.readings.iter().flatten().filter_map(|reading| match reading.value {
             Measured::Fix(place) => Some((reading.time, place)),
-            Measured::Vector(_) => None,
+            Measured::Vector(_) | Measured::Polar(_) => None,
         });
         fixes.min_by_key(|(time, _)| *time).map(|(_, place)| place.to_degrees())
+    }
+
+    /// Whether its positions are ranges, bearings and depressions; what is of the rarer kind is left out.
+    pub(super) fn one_kind(&mut self) -> bool {
+        let positions = &mut self.readings[Quantity::Position as usize];
+        let is_polar = |reading: &Reading| matches!(reading.value, Measured::Polar(_));
+        let (all, polar) = (positions.len(), positions.iter().filter(|r| is_polar(r)).count());
+        let mostly = 2 * polar > all;
+        positions.retain(|reading| is_polar(reading) == mostly);
+        let left_out = if mostly { all - polar } else { polar };
+        if left_out > 0 {
+            self.faults.insert("a position of another kind than most", left_out);
+        }
+        mostly
     }
 
     /// The samples; latitudes and longitudes count from `fix_origin` (degrees and m).
@@ -183,7 +216,7 @@ impl Gathered {
             let readings = std::mem::take(&mut self.readings[quantity as usize]);
             let value = |reading: &Reading| {
                 let value = match reading.value {
-                    Measured::Vector(value) => value,
+                    Measured::Vector(value) | Measured::Polar(value) => value,
                     Measured::Fix(place) => local.to_enu(place),
                 };
                 let is_whole = quantity == Quantity::Velocity || reading.offset_is_turned;
@@ -277,7 +310,7 @@ impl Gathered {
                  `time` for this source"
             ));
         }
-        if self.farthest_back_s > BACKWARD_S {
+        if self.farthest_back_s > BACKWARD_S && self.kind == Kind::Track {
             warnings.push(format!(
                 "{name}: times go back by up to {:.1} s from one message to the next",
                 self.farthest_back_s
@@ -289,7 +322,7 @@ impl Gathered {
 
 impl Fault {
     /// What is wrong; `None` where nothing is.
-    fn description(&self) -> Option<&'static str> {
+    pub(super) fn description(&self) -> Option<&'static str> {
         match self {
             Self::Miss(_) => Some("the path leads nowhere in them"),
             Self::NoVector { .. } => Some("no vector at the path"),
@@ -297,6 +330,9 @@ impl Fault {
             Self::NoFix => Some("their status is that there is no fix"),
             Self::OffEarth => Some("a latitude beyond 90 degrees or a longitude beyond 360"),
             Self::NoOrientation => Some("no orientation of unit length to turn the velocity by"),
+            Self::NoUnit => Some("angles of which nothing tells whether they are degrees or radians"),
+            Self::NoRange => Some("a range that is not positive"),
+            Self::NoAngle => Some("a bearing of more than a turn, or a depression beyond the vertical"),
             Self::Filtered => None,
         }
     }

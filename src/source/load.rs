@@ -6,8 +6,8 @@ use super::gathered::Gathered;
 use super::reading::Reader;
 use super::{SourceError, is_datum_like};
 use crate::config::SourceConfig;
-use crate::log::{Index, Log, Message, MessagesRead, passed_over};
-use crate::sample::Source;
+use crate::log::{Index, Log, LogError, Message, MessagesRead, passed_over};
+use crate::sample::{Quantity, Source};
 use crate::time::Time;
 
 /// Where a sigma comes from.
@@ -111,18 +111,7 @@ pub fn load(
     })?;
     let (mut left_out, mut first_error) = (passed_over(&read.damaged), None);
     for source in &mut gathered {
-        while let Some((quantity, error)) = source.lack() {
-            let error = match (error, read.damaged.first()) {
-                (SourceError::Empty { name, topic }, Some(first)) if source.messages == 0 => {
-                    SourceError::Unreadable {
-                        name,
-                        topic,
-                        parts: read.damaged.len(),
-                        first: first.to_string(),
-                    }
-                }
-                (error, _) => error,
-            };
+        while let Some((quantity, error)) = lack(source, &read.damaged) {
             if named {
                 return Err(error);
             }
@@ -141,6 +130,19 @@ pub fn load(
     let fix_origin = fix_origin.or_else(first_fix);
     let loaded = gathered.into_iter().map(|g| g.finish(origin, fix_origin)).collect();
     Ok(Samples { loaded, origin, left_out, read })
+}
+
+/// What stands against using a source, and the quantity at fault where it is one; `damaged` is what can't be read of
+/// the log.
+pub(super) fn lack(source: &mut Gathered, damaged: &[LogError]) -> Option<(Option<Quantity>, SourceError)> {
+    let (quantity, error) = source.lack()?;
+    let error = match (error, damaged.first()) {
+        (SourceError::Empty { name, topic }, Some(first)) if source.messages == 0 => {
+            SourceError::Unreadable { name, topic, parts: damaged.len(), first: first.to_string() }
+        }
+        (error, _) => error,
+    };
+    Some((quantity, error))
 }
 
 /// Who reads the messages of which channel.
@@ -163,7 +165,10 @@ impl Readers {
                 });
             }
             for channel in channels {
-                readers.push((channel.id, Reader::new(&source.config, &source.paths, index, channel)?));
+                readers.push((
+                    channel.id,
+                    Reader::new(&source.config, &source.paths, index, channel, source.kind)?,
+                ));
             }
         }
         for (channel, reader) in readers {

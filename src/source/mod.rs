@@ -5,27 +5,29 @@
 //! is one way in.
 
 mod candidate;
+mod dive;
 mod events;
 mod fix;
 mod gathered;
 mod glimpse;
 mod load;
+mod numbers;
+mod polar;
 mod propose;
 mod reading;
 mod recognise;
 mod recorded;
-mod scalar;
 mod topic;
 mod usbl;
 
 pub use candidate::{Candidate, Judged, Judgement, Unfit, judge};
+pub use dive::{DiveSamples, load_dive};
 pub use events::{RecordedEvent, recorded_events};
 pub use glimpse::{Glimpse, glimpse};
 pub use load::{Loaded, Samples, SigmaOrigin, Timing, datum, load};
 pub use propose::{Proposal, propose, propose_chosen};
 pub use recognise::{Choice, Recognised, choices_of, recognise};
 pub use recorded::{Recorded, recorded, reference};
-pub use scalar::{Scalar, load_scalar};
 pub use topic::is_datum_like;
 pub use usbl::usbl_fix;
 
@@ -73,6 +75,36 @@ pub enum SourceError {
         several: bool,
         /// Those, or all topics that hold a position.
         candidates: Vec<Candidate>,
+    },
+    /// Angles of which nothing tells the unit.
+    #[error("source {name:?}: the angles at {} may be degrees or radians", printable(path))]
+    NoUnit {
+        /// The source.
+        name: String,
+        /// The path.
+        path: String,
+    },
+    /// Angles beyond those that there are.
+    #[error(
+        "source {name:?}: bearings at {} are beyond a turn, or depressions beyond the vertical, in all {count} messages",
+        printable(path)
+    )]
+    NotAngles {
+        /// The source.
+        name: String,
+        /// The path.
+        path: String,
+        /// Number of messages.
+        count: usize,
+    },
+    /// Ranges and bearings, and nothing to count them from.
+    #[error(
+        "the fixes at {} are ranges, bearings and depressions, expected the ship's position and heading beside them",
+        printable(path)
+    )]
+    NoShip {
+        /// The fixes' path.
+        path: String,
     },
     /// A path leads to something that is no number.
     #[error("source {name:?}: {} is no finite number in any of {count} messages", printable(path))]
@@ -265,6 +297,13 @@ impl SourceError {
                 let path = candidates.iter().find_map(|c| c.position.clone());
                 let path = toml_string(&path.unwrap_or_else(|| "/topic.field".into()));
                 format!("`[usbl]` with `fix = {path}` in a config names the fixes: `--config`")
+            }
+            Self::NoUnit { .. } => "`angles = \"deg\"` or `angles = \"rad\"` in `[usbl]` says which".into(),
+            Self::NotAngles { .. } => "if they are degrees, `angles = \"deg\"` in `[usbl]` says so".into(),
+            Self::NoShip { .. } => {
+                "`ship = \"/ship/navigation.position\"` and `heading = \"/ship/navigation.heading\"` in `[usbl]` name them, by \
+                 the message paths of your log, and `angles = \"deg\"` or `\"rad\"` the unit of the angles"
+                    .into()
             }
             Self::NoOrientation { .. } => {
                 "`velocity_frame = \"world\"` in this source says that nothing need be turned".into()

@@ -2,6 +2,8 @@
 
 use super::SourceError;
 use super::fix::{covariance_is_unknown, fix};
+use super::gathered::Kind;
+use super::polar::polar;
 use crate::config::{Axes, SourceConfig, TimeChoice, VelocityFrame};
 use crate::log::decode::{DecodeError, Decoder, MessagePath, PathMiss, Step, Value};
 use crate::log::{Channel, Index, Message};
@@ -45,6 +47,8 @@ pub(super) enum Measured {
     Vector([f64; 3]),
     /// A place on the earth.
     Fix(Geodetic),
+    /// Range, m, bearing and depression, rad, from a ship.
+    Polar([f64; 3]),
 }
 
 /// Which of the three times of a message counted.
@@ -87,6 +91,12 @@ pub(super) enum Fault {
     OffEarth,
     /// A body-frame velocity without an orientation of unit length beside it.
     NoOrientation,
+    /// Angles of which nothing tells whether they are degrees.
+    NoUnit,
+    /// A range that is not positive.
+    NoRange,
+    /// Angles beyond those that there are.
+    NoAngle,
 }
 
 /// Reads the messages of one channel of one source.
@@ -99,6 +109,7 @@ pub(super) struct Reader {
     latency_s: f64,
     axes: Axes,
     offset_m: [f64; 3],
+    kind: Kind,
 }
 
 /// Where the messages of a topic keep their time.
@@ -160,6 +171,7 @@ impl Reader {
         paths: &[(Quantity, MessagePath)],
         index: &Index,
         channel: &Channel,
+        kind: Kind,
     ) -> Result<Self, SourceError> {
         let schema = index.schema_of(channel);
         let (encoding, schema_name, data) =
@@ -209,6 +221,7 @@ impl Reader {
             latency_s: config.latency_s,
             axes: config.axes,
             offset_m: config.offset_m,
+            kind,
         })
     }
 
@@ -237,6 +250,12 @@ impl Reader {
         if let (Quantity::Position, Some(place)) = (vector.quantity, fix(at)) {
             let sigma = sigma.filter(|_| !covariance_is_unknown(at));
             return Ok(Reading { time, value: Measured::Fix(place?), sigma, offset_is_turned: false });
+        }
+        if let Kind::Acoustic(unit) = self.kind
+            && let Some(measured) = polar(at, unit)
+        {
+            let value = Measured::Polar(measured?);
+            return Ok(Reading { time, value, sigma: None, offset_is_turned: false });
         }
         let mut value = at.as_vector3().ok_or_else(|| no_vector(&vector.path, at))?;
         let turn = |path: &MessagePath| path.resolve(message).ok().flatten().and_then(rotation);

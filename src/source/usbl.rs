@@ -1,7 +1,7 @@
 //! Which topic holds a USBL system's fixes.
 
 use super::SourceError;
-use super::candidate::{Candidate, judge};
+use super::candidate::{Candidate, Judged, Unfit, judge, quoted};
 use crate::log::{Log, LogError};
 
 /// The message path of the fixes of the one topic with `usbl` in its name that holds a position, and what could not be
@@ -12,7 +12,15 @@ use crate::log::{Log, LogError};
 /// is damaged.
 pub fn usbl_fix(log: &Log) -> Result<(String, Vec<LogError>), SourceError> {
     let mut judgement = judge(log);
-    let fit = judgement.channels.into_iter().filter_map(|channel| channel.verdict.ok());
+    // what only `usbl` can place has its path too
+    let placed = |channel: Judged| match channel.verdict {
+        Err(Unfit::Polar) => {
+            let position = Some(quoted(&channel.topic));
+            Some(Candidate { topic: channel.topic, position, velocity: None })
+        }
+        verdict => verdict.ok(),
+    };
+    let fit = judgement.channels.into_iter().filter_map(placed);
     let mut fit: Vec<Candidate> = fit.filter(|candidate| candidate.position.is_some()).collect();
     fit.sort_by(|a, b| a.topic.cmp(&b.topic));
     fit.dedup();

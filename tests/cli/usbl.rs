@@ -1,10 +1,13 @@
 //! `trackfuse usbl` on dives whose truth is known.
 
+use std::f64::consts::TAU;
 use std::fs;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 use serde_json::{Value, json};
+use trackfuse::sample::Sample;
 use trackfuse::simulate::{DiveConstants, SimulatedFix, Trajectory, UsblConstants, dive, watch_by_usbl};
 
 use super::trial::{Output, Ran, Trial, assert_says, trackfuse};
@@ -181,11 +184,114 @@ fn latitudes_longitudes_and_depths_are_fixes_too_and_a_depth_channel_helps() {
         .unwrap();
     assert!((near.vector("position")[2] - dive.position(mid)[2]).abs() < 2.0, "the depth goes on in silence");
     assert!(found["fixes"]["off_depth"].as_u64().unwrap() > 50);
-    assert!(output.topics.contains_key("/usbl/fix") && output.topics.contains_key("/usbl/geojson"));
+    assert!(output.topics.contains_key("/usbl/track_fix") && output.topics.contains_key("/usbl/geojson"));
     // without an origin z = 0 is the surface all the same
     let trial = trial.config(SIGMA);
     let (found, _) = report(&trial, 0);
     assert_eq!(found["track"]["origin"][2], 0.0);
+}
+
+/// The ship circles over the dive, and its system measures range, bearing and depression of every fix's place, each
+/// with noise; `names` are the fields' names and the factor from radians.
+fn polar_log(dive: &Dive, names: [&str; 3], per_radian: f64) -> TrialLog {
+    let mut rng = ChaCha8Rng::seed_from_u64(99);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let ship = |t: f64| {
+        let angle = 0.002 * t;
+        ([150.0 * angle.cos(), 150.0 * angle.sin(), -4.0], (-angle).rem_euclid(TAU))
+    };
+    let mut log = TrialLog::new();
+    for t in 0..3600 {
+        let (p, heading) = ship(f64::from(t));
+        let message = json!({"timestamp": stamp(ns(f64::from(t))), "position": xyz(p), "heading": heading * per_radian});
+        log.json("/ship/navigation", f64::from(t), &message);
+    }
+    for fix in &dive.fixes {
+        let t = fix.sample.time_s;
+        let (from, heading) = ship(t);
+        let place = if fix.wild { fix.sample.value } else { dive.position(t) };
+        let [east, north, up] = [0, 1, 2].map(|i| place[i] - from[i]);
+        let range = (east * east + north * north + up * up).sqrt() + 0.4 * normal();
+        let noise = 0.003;
+        let bearing = (east.atan2(north) - heading + noise * normal()).rem_euclid(TAU);
+        let depression = (-up).atan2(east.hypot(north)) + noise * normal();
+        let message = json!({"timestamp": stamp(ns(t)), names[0]: range, names[1]: bearing * per_radian,
+                             names[2]: depression * per_radian});
+        log.json("/usbl/raw", t, &message);
+    }
+    log
+}
+
+const SHIP: &str = "[usbl]\nship = \"/ship/navigation.position\"\nheading = \"/ship/navigation.heading\"\n\
+                    range_sigma_m = 0.4\nangle_sigma_deg = 0.17\nheading_sigma_deg = 0.01\nship_sigma_m = 0.1\n";
+
+#[test]
+fn ranges_bearings_and_depressions_are_fixes_with_the_ships_position_and_heading() {
+    let dive = Dive::new(20);
+    let in_degrees = polar_log(&dive, ["range", "bearing", "depression"], 360.0 / TAU).finish();
+    let trial = Trial::of(&in_degrees).config(&format!("{SHIP}angles = \"deg\"\n"));
+    let (found, output) = report(&trial, 0);
+    assert_eq!(found["source"]["position"], "/usbl/raw");
+    assert_eq!(found["source"]["position_sigma_from"], "config");
+    let track = &output.topics["/usbl/track"];
+    let ([seen_m, silent_m], covered) = dive.held_against(track);
+    assert!(seen_m < 2.0 && silent_m < 30.0, "{seen_m} {silent_m}");
+    assert!((0.88..=1.0).contains(&covered), "{covered}");
+    // the same in radians, which the names say
+    let named = polar_log(&dive, ["slant_range", "azimuth_rad", "depression_rad"], 1.0).finish();
+    let named = Trial::of(named).config(&format!("{SHIP}angles = \"rad\"\n"));
+    let (_, other) = report(&named, 0);
+    let apart = |i: usize| {
+        let (a, b) = (track[i].vector("position"), other.topics["/usbl/track"][i].vector("position"));
+        (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max)
+    };
+    assert!(apart(500) < 1e-6 && apart(3000) < 1e-6);
+    // what is missing is asked for by name
+    let refused = |config: &str, words: &[&str]| {
+        let ran = run(&Trial::of(&in_degrees).config(config), &[]);
+        assert_eq!(ran.code, 2, "{ran:#?}");
+        assert_says(&ran.stderr, words);
+    };
+    refused("[usbl]\nangles = \"deg\"\n", &["ship's position and heading", "hint: ", "ship = "]);
+    refused(SHIP, &["may be degrees or radians", "hint: ", "angles = "]);
+    refused(&format!("{SHIP}angles = \"rad\"\n"), &["beyond a turn", "hint: ", "angles = "]);
+    let ran = run(&Trial::of(&in_degrees), &[]);
+    assert_says(&ran.stderr, &["ship"]);
+}
+
+#[test]
+fn noise_that_grows_with_the_range_widens_the_bands_where_the_vehicle_is_far() {
+    let dive = Dive::new(21);
+    let mut log = TrialLog::new();
+    for t in 0..3600 {
+        let message = json!({"timestamp": stamp(ns(f64::from(t))), "position": xyz([0.0, 0.0, -4.0])});
+        log.json("/ship/navigation", f64::from(t), &message);
+    }
+    for fix in &dive.fixes {
+        let (t, value) = (fix.sample.time_s, fix.sample.value);
+        let place = dive.position(t);
+        let range = place.iter().map(|p| p * p).sum::<f64>().sqrt();
+        let noise = if fix.wild { 1.0 } else { 1.0_f64.hypot(0.005 * range) / 3.0 };
+        let sample =
+            Sample { value: [0, 1, 2].map(|i| place[i] + noise * (value[i] - place[i])), ..fix.sample };
+        log.json("/usbl/fix", t, &xyz_message(&SimulatedFix { sample, ..*fix }));
+    }
+    let ship = "[usbl]\nsigma_m = 1.0\nship = \"/ship/navigation.position\"\nsigma_of_range = 0.005\n";
+    let (found, output) = report(&Trial::of(log.finish()).config(ship), 0);
+    let said = &output.topics["/usbl/fixes"];
+    let sigma = |i: usize| said[i].vector("position_sigma")[0];
+    assert!(
+        (sigma(2) - 1.0).abs() < 0.1 && sigma(said.len() / 2) > 2.0,
+        "{} {}",
+        sigma(2),
+        sigma(said.len() / 2)
+    );
+    assert!(
+        (found["track"]["noise_scale"][0].as_f64().unwrap() - 1.0).abs() < 0.15,
+        "the noise is as stated"
+    );
+    let (_, covered) = dive.held_against(&output.topics["/usbl/track"]);
+    assert!((0.88..=1.0).contains(&covered), "{covered}");
 }
 
 #[test]

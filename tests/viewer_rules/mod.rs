@@ -28,7 +28,9 @@ const PRIMITIVES: [&str; 8] =
 pub(crate) fn assert_shown(path: &Path) {
     let log = fs::read(path).expect("a log");
     let prefixes = added_prefixes(&log);
-    let is_new = |topic: &str| prefixes.iter().any(|p| topic.starts_with(p));
+    // a run that judges fixes may stand beside the sensor's own topics
+    let is_sensor = |topic: &str| ["/usbl/fix", "/usbl/raw"].contains(&topic);
+    let is_new = |topic: &str| !is_sensor(topic) && prefixes.iter().any(|p| topic.starts_with(p));
     let found = violations(&log, is_new);
     assert!(found.is_empty(), "{}:\n{}", path.display(), found.join("\n"));
 }

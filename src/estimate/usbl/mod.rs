@@ -61,6 +61,7 @@
 pub mod causal;
 pub mod cycles;
 pub mod geometry;
+pub mod ship;
 
 mod candidates;
 mod clean;
