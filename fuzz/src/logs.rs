@@ -53,7 +53,7 @@ pub fn open(data: &[u8]) {
                 assert!(found.contains(&(id, message.log_time, message.data.len())), "channel {id}");
             }
         }
-        let _ = inspect(&log, "/fused");
+        let _ = inspect(&log);
     });
 }
 
