@@ -135,6 +135,12 @@ impl Page {
 }
 
 impl Section {
+    /// A section.
+    #[must_use]
+    pub fn new(id: &'static str, title: &'static str, parts: Vec<Part>) -> Self {
+        Self { id, title, parts }
+    }
+
     fn markup(&self) -> Markup {
         html! {
             section id=(self.id) {
@@ -153,6 +159,11 @@ impl Section {
             }
         }
     }
+}
+
+/// The last part of a path, whatever system it is of.
+pub(super) fn file_name(path: &str) -> &str {
+    path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
 /// Where a script draws.
@@ -185,10 +196,8 @@ mod tests {
             x_label: "s",
             y_label: said(),
             series: vec![series],
-            levels: Vec::new(),
-            range: None,
-            y_range: None,
             group: "motion",
+            ..Plot::default()
         };
         let table = Table { caption: said(), columns: vec![Column::words("what")], rows: vec![vec![said()]] };
         let parts =
