@@ -13,6 +13,7 @@ use crate::printable::printable;
 use crate::sample::Source;
 use crate::source::Loaded;
 use crate::time::Time;
+use crate::track::Phase;
 
 /// The report of `usbl`. Nanoseconds are strings, since JSON numbers lose them.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -210,56 +211,100 @@ pub fn render_usbl(report: &UsblReport) -> String {
 }
 
 fn write_page(out: &mut String, report: &UsblReport) -> fmt::Result {
-    let (source, track, fixes) = (&report.source, &report.track, &report.fixes);
-    let paths = source.position.as_deref().map(printable).unwrap_or_default();
-    write!(out, "fixes   {} of {paths}, timed by {}", source.positions, source.clock)?;
-    if let (Some(sigma), Some(from)) = (source.position_sigma_m, &source.position_sigma_from) {
-        write!(out, ", sigma {sigma:.2} m ({from})")?;
+    let track = &report.track;
+    writeln!(out, "track   known to {} (1 sigma, over three axes)", known(report))?;
+    let span_s = track.span_s.1 - track.span_s.0;
+    write!(out, "        {} points at {} Hz over {span_s:.2} s", track.points, short(track.rate_hz))?;
+    if !track.frame_id.is_empty() {
+        write!(out, ", frame {:?}", track.frame_id)?;
     }
     writeln!(out)?;
-    writeln!(out, "        {} kept", fixes.kept)?;
+    text::origin(out, track.origin)?;
+    let prediction = &report.prediction;
+    if let Some(off) = off(prediction) {
+        writeln!(
+            out,
+            "        a prediction by the past alone ({}) was {off} (root mean square)",
+            prediction.method
+        )?;
+    }
+    writeln!(out)?;
+    fixes(out, report)?;
+    writeln!(out)?;
+    text::phases(out, &report.phases)?;
+    text::notes(out, &report.notes)?;
+    text::warnings(out, &report.warnings)
+}
+
+/// How well the place is known where fixes come and in silence.
+pub(super) fn known(report: &UsblReport) -> String {
+    let of_phase = |p: &PhaseReport| {
+        let sigma_m = p.position_sigma_m.map_or("unknown".into(), |s| format!("± {s:.1} m"));
+        if p.phase == Phase::Bridged.name() {
+            format!("{sigma_m} in {} of silence", duration(p.points as f64 / report.track.rate_hz))
+        } else {
+            format!("{sigma_m} where fixes come")
+        }
+    };
+    report.phases.iter().map(of_phase).collect::<Vec<_>>().join(", ")
+}
+
+/// How far the prediction was off while fixes came and in silence; `None` where there is none to be held against the
+/// track.
+pub(super) fn off(prediction: &PredictionReport) -> Option<String> {
+    let seen = prediction.rmse_m.map(|m| format!("{m:.1} m off while fixes came"));
+    let silent = prediction.silent_rmse_m.map(|m| format!("{m:.1} m off in silence"));
+    seen.into_iter().chain(silent).reduce(|a, b| format!("{a} and {b}"))
+}
+
+/// In seconds, minutes or hours, whichever is read at a glance.
+pub(super) fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 300.0 => format!("{s:.0} s"),
+        s if s < 10_800.0 => format!("{:.1} min", s / 60.0),
+        s => format!("{:.1} h", s / 3600.0),
+    }
+}
+
+fn fixes(out: &mut String, report: &UsblReport) -> fmt::Result {
+    let (source, fixes) = (&report.source, &report.fixes);
+    let path = source.position.as_deref().map(printable).unwrap_or_default();
+    writeln!(out, "fixes   {} of {path}, timed by {}", source.positions, source.clock)?;
+    writeln!(out, "        {} kept; {}", fixes.kept, noise(report))?;
     for (count, why) in [
         (fixes.off_by_itself, "thrown out: each off by itself"),
         (fixes.off_as_cycle, "thrown out with their whole exchange"),
         (fixes.off_depth, "thrown out: not at the depth sensor's depth"),
-        (fixes.repeated, "thrown out: they repeat another one"),
-        (fixes.late, "came late, and are not in the prediction"),
+        (fixes.repeated, "passed over: they repeat another one"),
+        (fixes.late, "of all these came late, and are not in the prediction"),
     ] {
         if count > 0 {
             writeln!(out, "        {count} {why}")?;
         }
     }
     let ExchangesReport { count, thrown_out, cycle_s } = report.exchanges;
-    writeln!(out, "        {count} exchanges, {cycle_s:.1} s apart; {thrown_out} thrown out as a whole")?;
+    write!(out, "        {count} exchanges, {cycle_s:.1} s apart")?;
+    if thrown_out > 0 {
+        write!(out, "; {thrown_out} of them thrown out as a whole")?;
+    }
+    writeln!(out)?;
     if let Some(DepthReport { path, samples }) = &report.depth {
         writeln!(out, "depth   {samples} of {}", printable(path))?;
     }
-    writeln!(out)?;
-    let duration = track.span_s.1 - track.span_s.0;
-    write!(out, "track   {} points at {} Hz over {duration:.2} s", track.points, short(track.rate_hz))?;
-    if !track.frame_id.is_empty() {
-        write!(out, ", frame {:?}", track.frame_id)?;
+    Ok(())
+}
+
+/// The noise of the fixes that were kept, beside what was stated.
+fn noise(report: &UsblReport) -> String {
+    let [across, down] = report.track.noise_scale;
+    match (report.source.position_sigma_m, &report.source.position_sigma_from) {
+        (Some(sigma), Some(from)) => format!(
+            "1 sigma of their noise is {:.2} m in x and y, {:.2} m in z ({sigma:.2} m: {from})",
+            across * sigma,
+            down * sigma
+        ),
+        _ => format!("their noise is {across:.2} times what was stated in x and y, {down:.2} times in z"),
     }
-    writeln!(out)?;
-    text::origin(out, track.origin)?;
-    let ([across, down], [q_across, q_down]) = (track.noise_scale, track.acceleration_density);
-    writeln!(
-        out,
-        "        noise / stated: {across:.2} {down:.2}; liveliness {q_across:.1e} {q_down:.1e} m2/s3 (horizontal, vertical)"
-    )?;
-    let prediction = &report.prediction;
-    let off = |v: Option<f64>| v.map_or("-".into(), |v| format!("{v:.1} m"));
-    writeln!(
-        out,
-        "prediction by the past alone ({}): {} off the track while fixes come, {} in silence",
-        prediction.method,
-        off(prediction.rmse_m),
-        off(prediction.silent_rmse_m)
-    )?;
-    writeln!(out)?;
-    text::phases(out, &report.phases)?;
-    text::notes(out, &report.notes)?;
-    text::warnings(out, &report.warnings)
 }
 
 #[cfg(test)]

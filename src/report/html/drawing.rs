@@ -252,7 +252,11 @@ impl<'a> Drawing<'a> {
 
 /// The rows with the points beside every change of phase and every gap longer than `max_step_s`, and a row of nothing in
 /// the gaps; of changes more often than can be seen only the first ones.
-pub(super) fn with_borders(points: &[TrackPoint], mut kept: Vec<usize>, max_step_s: f64) -> Vec<Option<usize>> {
+pub(super) fn with_borders(
+    points: &[TrackPoint],
+    mut kept: Vec<usize>,
+    max_step_s: f64,
+) -> Vec<Option<usize>> {
     let is_gap = |i: usize| points[i].time.seconds_since(points[i - 1].time) > max_step_s;
     let gaps: Vec<usize> = (1..points.len()).filter(|&i| is_gap(i)).collect();
     let changes = (1..points.len()).filter(|&i| points[i].phase != points[i - 1].phase);

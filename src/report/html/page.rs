@@ -7,14 +7,18 @@ use super::secured::{embedded, policy};
 use super::{Columns, Plot, Space, Table};
 use crate::printable::printable;
 
-/// uPlot with its licence, which asks to go with every copy.
-const UPLOT: &str =
-    concat!("/*\n", include_str!("uplot/LICENSE"), "*/\n", include_str!("uplot/uPlot.iife.min.js"));
+/// uPlot with its licence, which asks to go with every copy, behind what tells it how sharp to draw.
+const UPLOT: &str = concat!(
+    include_str!("theme.js"),
+    "/*\n",
+    include_str!("uplot/LICENSE"),
+    "*/\n",
+    include_str!("uplot/uPlot.iife.min.js")
+);
 const UPLOT_STYLE: &str = include_str!("uplot/uPlot.min.css");
 const STYLE: &str = include_str!("page.css");
 /// In the order in which they need each other.
-const SCRIPTS: [&str; 4] =
-    [include_str!("theme.js"), include_str!("plot.js"), include_str!("space.js"), include_str!("page.js")];
+const SCRIPTS: [&str; 3] = [include_str!("plot.js"), include_str!("space.js"), include_str!("page.js")];
 
 /// A report for a browser.
 #[derive(Clone, Debug, Default)]

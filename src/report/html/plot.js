@@ -38,7 +38,9 @@ function prepared(plot, tables) {
         const sigma = table[s.band.sigma][i];
         return v === null || sigma === null ? null : v + sign * s.band.sigmas * sigma;
       });
-      const line = { stroke: () => faded(color("faint"), 0.55), width: 0.5, points: { show: false } };
+      // beside a line of its own a band has its scale
+      const isOutlier = s.style === "band";
+      const line = { stroke: () => faded(color("faint"), 0.55), width: 0.5, points: { show: false }, auto: !isOutlier, isOutlier };
       const upper = add(x, edge(1), { ...line, label: s.style === "band" ? s.label : "95 % band", isBand: true, class: "band" });
       const lower = add(x, edge(-1), { ...line, label: "lower edge", class: "lower" });
       bands.push({ series: [upper, lower], fill: () => faded(color("faint"), 0.25) });
@@ -46,7 +48,8 @@ function prepared(plot, tables) {
     if (s.style === "band") continue;
     if (s.style === "outliers") {
       const stroke = () => ink(s.ink);
-      const points = { show: true, size: 7, width: 1.3, fill: stroke, stroke, paths: (u, i, from, to) => signs(u, i, from, to, s.ink.index) };
+      const size = x.length > 1000 ? 1.4 : x.length > 200 ? 2.2 : 3.2;
+      const points = { show: true, size: 2 * size, width: 1.2, fill: stroke, stroke, paths: (u, i, from, to) => signs(u, i, from, to, s.ink.index, size) };
       add(x, y, { label: SIGNS[s.ink.index % 3] + " " + s.label, stroke, width: 0, paths: () => null, points, auto: false, isOutlier: true });
     } else if (phases) {
       ground = stretches(x, phases);
@@ -56,7 +59,7 @@ function prepared(plot, tables) {
       }
     } else {
       const stroke = () => ink(s.ink);
-      const isDots = s.style === "dots", size = s.ink.of === "plain" ? 6 : y.length > 1000 ? 2 : 3;
+      const isDots = s.style === "dots", size = s.ink.of === "plain" ? 6 : y.length > 1000 ? 2 : y.length > 50 ? 3 : 5;
       add(x, y, {
         label: s.label, stroke, width: isDots ? 0 : 1.5, paths: isDots ? () => null : undefined,
         points: { show: isDots, size, width: 0, fill: stroke, stroke },
@@ -69,8 +72,8 @@ function prepared(plot, tables) {
 }
 
 /** The signs of what was thrown out; those beyond the plot are arrows at its edge. */
-function signs(u, series, from, to, index) {
-  const path = new Path2D(), r = 3 * sharpness, { top, height } = u.bbox, { min, max } = u.scales.x;
+function signs(u, series, from, to, index, size) {
+  const path = new Path2D(), r = size * sharpness, { top, height } = u.bbox, { min, max } = u.scales.x;
   for (let i = from; i <= to; i++) {
     const x = u.data[0][i], value = u.data[series][i];
     if (value == null || x < min || x > max) continue;

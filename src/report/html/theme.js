@@ -1,5 +1,5 @@
 "use strict";
-// Paper shows what is drawn with at least two pixels a point sharp; uPlot, too, asks the window.
+// Paper shows what is drawn with at least two pixels a point sharp; uPlot, too, asks the window, when it is loaded.
 const sharpness = Math.max(2, Math.min(3, window.devicePixelRatio || 1));
 Object.defineProperty(window, "devicePixelRatio", { get: () => sharpness, configurable: true });
 

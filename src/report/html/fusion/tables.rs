@@ -193,8 +193,7 @@ pub(super) fn provenance(report: &Report, known: &[(String, String)], config: &s
     said.extend_from_slice(known);
     said.push(tables::said("T0, ns", &report.t0_ns));
     let rate = short(track.rate_hz);
-    let made =
-        format!("{} ({}), {} points at {rate} Hz", track.method, track.coefficients, track.points);
+    let made = format!("{} ({}), {} points at {rate} Hz", track.method, track.coefficients, track.points);
     said.push(tables::said("track", &made));
     said.extend(tables::place(&track.frame_id, track.origin));
     if let Some(found) = &report.registration {

@@ -70,6 +70,7 @@ fn add(drawing: &mut Drawing<'_>, rows: &[(f64, f64)]) -> Option<usize> {
     (!rows.is_empty()).then(|| drawing.add(columns))
 }
 
+/// A sign for every reason, dots without one.
 fn series(label: &str, table: usize, reason: Option<usize>) -> Series {
     let (style, ink) = reason.map_or((Style::Dots, Ink::Source(0)), |i| (Style::Outliers, Ink::Rejected(i)));
     Series { style, ..Drawing::dots(label, table, 0, ink) }
@@ -150,22 +151,23 @@ fn by_axis(drawing: &mut Drawing<'_>, parts: Parts<'_>) -> Option<Plot> {
 
 fn numbers(parts: Parts<'_>) -> Table {
     let (fixes, all) = (&parts.report.fixes, parts.report.source.positions);
-    let row = |what: &str, count: usize| {
+    let counts = [
+        ("kept", fixes.kept),
+        ("thrown out: each off by itself", fixes.off_by_itself),
+        ("thrown out with their whole exchange", fixes.off_as_cycle),
+        ("thrown out: not at the depth sensor's depth", fixes.off_depth),
+        ("passed over: they repeat another one", fixes.repeated),
+        ("all", all),
+        ("of these came late, and are not in the prediction", fixes.late),
+    ];
+    let row = |(what, count): (&str, usize)| {
         let share = 100.0 * count as f64 / all.max(1) as f64;
         vec![what.to_owned(), count.to_string(), value(share, 1)]
     };
     Table {
         caption: "What became of the fixes".into(),
         columns: vec![Column::words("fixes"), Column::numbers("number"), Column::numbers("%")],
-        rows: vec![
-            row("kept", fixes.kept),
-            row("thrown out: each off by itself", fixes.off_by_itself),
-            row("thrown out with their whole exchange", fixes.off_as_cycle),
-            row("thrown out: not at the depth sensor's depth", fixes.off_depth),
-            row("passed over: they repeat another one", fixes.repeated),
-            row("all", all),
-            row("of these came late, and are not in the prediction", fixes.late),
-        ],
+        rows: counts.into_iter().filter(|(_, count)| *count > 0).map(row).collect(),
     }
 }
 
@@ -176,7 +178,12 @@ fn exchanges(parts: Parts<'_>) -> Table {
     let per_exchange = report.source.positions as f64 / exchanges.count.max(1) as f64;
     let stated = report.source.position_sigma_m;
     let noise = |scale: f64| match stated {
-        Some(sigma) => format!("{} m, {} times the {} m above", value(sigma * scale, 2), value(scale, 2), value(sigma, 2)),
+        Some(sigma) => format!(
+            "{} m, {} times the {} m below",
+            value(sigma * scale, 2),
+            value(scale, 2),
+            value(sigma, 2)
+        ),
         None => format!("{} times what the messages state", value(scale, 2)),
     };
     let mut rows = vec![

@@ -12,7 +12,7 @@ use super::{Page, Part, Section};
 use crate::fusion::usbl::Dive;
 use crate::report::UsblReport;
 use crate::report::text::short;
-use crate::sample::Sample;
+use crate::sample::{Sample, Source};
 use crate::time::Time;
 
 /// What the page is made of.
@@ -33,8 +33,8 @@ pub struct Parts<'a> {
 /// What the plots over time draw beside the track.
 const BESIDE: &str = "dots are the fixes that were kept, signs those that were thrown out. The plots have the scale of the \
                       track and of the fixes that were kept: what was thrown out beyond it stands as an arrow at the edge, \
-                      and a double-click where all the time is shown makes room for it, or takes that room away. `single` \
-                      is where fixes come, `bridged` the silence between two fixes.";
+                      and a double-click where all the time is shown makes room for it, or takes that room away. Single \
+                      is where fixes come, bridged the silence between two.";
 
 /// Plots with this name share their cursor and zoom: all those over time.
 const GROUP: &str = "motion";
@@ -44,9 +44,10 @@ const GROUP: &str = "motion";
 pub fn page(parts: Parts<'_>, provenance: &[(String, String)], config: &str) -> Page {
     let Parts { report, dive, origin, t0, .. } = parts;
     let rejected = fixes::thrown_out(parts);
+    let kept = Source { name: "kept".into(), ..dive.kept.clone() };
     let drawn = Drawn {
         fusion: &dive.fusion,
-        sources: std::slice::from_ref(&dive.kept),
+        sources: std::slice::from_ref(&kept),
         rejected: &rejected,
         rate_hz: report.track.rate_hz,
         origin,
@@ -55,8 +56,9 @@ pub fn page(parts: Parts<'_>, provenance: &[(String, String)], config: &str) -> 
     let mut drawing = Drawing::new(drawn);
     let mut motion = drawing.motion(2, BESIDE);
     motion.push(Part::Table(tables::phases(&report.phases)));
-    motion.extend(silences::table(&dive.fusion.track, &dive.prediction, t0).map(Part::Table));
-    let predicted = prediction::parts(&mut drawing, parts);
+    let errors = prediction::errors(parts);
+    motion.extend(silences::table(&dive.fusion.track, &errors, t0).map(Part::Table));
+    let predicted = prediction::parts(&mut drawing, parts, &errors);
     let judged = fixes::parts(&mut drawing, parts);
     let sections = vec![
         Section::new("space", "Track in space", drawing.in_space()),

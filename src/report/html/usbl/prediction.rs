@@ -16,40 +16,53 @@ const SIGMA: usize = 4;
 const ZERO: usize = 7;
 const PHASE: usize = 8;
 
-/// A point of the prediction, and what it lies from the track.
+/// A point of the prediction, and how far it lies from the track.
 #[derive(Clone, Copy, Debug)]
-struct Error {
-    point: TrackPoint,
-    off_m: [f64; 3],
+pub(super) struct Error {
+    pub(super) point: TrackPoint,
+    pub(super) off_m: [f64; 3],
 }
 
-/// Text, numbers and plots.
-pub(super) fn parts(drawing: &mut Drawing<'_>, parts: Parts<'_>) -> Vec<Part> {
-    let Parts { report, dive, origin, .. } = parts;
+impl Error {
+    /// Over three axes.
+    pub(super) fn distance_m(&self) -> f64 {
+        self.off_m.iter().map(|v| v * v).sum::<f64>().sqrt()
+    }
+}
+
+/// Those of the whole prediction, in order of time.
+pub(super) fn errors(parts: Parts<'_>) -> Vec<Error> {
+    let Parts { dive, origin, .. } = parts;
     let error = |point: &TrackPoint| {
         let track = dive.cleaned.at(point.time.seconds_since(origin))?;
         let off_m = std::array::from_fn(|i| point.state.position[i] - track.position[i]);
         Some(Error { point: *point, off_m })
     };
-    let errors: Vec<Error> = dive.prediction.points.iter().filter_map(error).collect();
+    dive.prediction.points.iter().filter_map(error).collect()
+}
+
+/// Text, numbers and plots.
+pub(super) fn parts(drawing: &mut Drawing<'_>, parts: Parts<'_>, errors: &[Error]) -> Vec<Part> {
+    let report = parts.report;
     if errors.is_empty() {
         return vec![Part::Text("There were too few fixes to predict anything.".into())];
     }
     let has_sigma = errors.iter().any(|e| e.point.state.position_sigma.iter().all(|s| s.is_finite()));
     let band = if has_sigma {
-        "the grey band is 1.96 of the sigmas that it stated then, and holds 95 % of its errors where those are right"
+        "the grey band is 1.96 of the sigmas that it stated, and holds 95 % of its errors where those are right; a double-click \
+         where all the time is shown makes room for it"
     } else {
         "it states no sigma"
     };
     let text = format!(
         "At every instant {} says where the vehicle is, from the fixes that had come by then; of what came late it knows \
-         nothing. Lines are how far that was off the track, which knows all fixes; {band}. `extrapolated` is where it had \
+         nothing. Lines are how far that was off the track, which knows all fixes; {band}. Extrapolated is where it had \
          heard nothing for longer than two and a half exchanges.",
         report.prediction.method
     );
-    let table = add(drawing, &errors, report.track.rate_hz, parts);
+    let table = add(drawing, errors, report.track.rate_hz, parts);
     let plots = (0..3).map(|axis| plot(table, axis, has_sigma)).collect();
-    vec![Part::Text(text), Part::Table(numbers(&errors)), Part::Plots(1, plots)]
+    vec![Part::Text(text), Part::Table(numbers(errors)), Part::Plots(1, plots)]
 }
 
 fn add(drawing: &mut Drawing<'_>, errors: &[Error], rate_hz: f64, parts: Parts<'_>) -> usize {
@@ -106,7 +119,7 @@ fn numbers(errors: &[Error]) -> Table {
             let sum: f64 = of.iter().flat_map(|e| axes.iter().map(|&i| e.off_m[i].powi(2))).sum();
             (sum / of.len() as f64).sqrt()
         };
-        let worst = of.iter().map(|e| e.off_m.iter().map(|v| v * v).sum::<f64>().sqrt()).reduce(f64::max);
+        let worst = of.iter().map(|e| e.distance_m()).reduce(f64::max);
         vec![
             when.to_owned(),
             of.len().to_string(),
@@ -132,7 +145,8 @@ fn numbers(errors: &[Error]) -> Table {
 
 /// The share of single axes whose band holds the error, of those with a band.
 fn held(errors: &[&Error]) -> Option<f64> {
-    let axes = errors.iter().flat_map(|e| (0..3).map(|i| (e.off_m[i].abs(), e.point.state.position_sigma[i])));
+    let axes =
+        errors.iter().flat_map(|e| (0..3).map(|i| (e.off_m[i].abs(), e.point.state.position_sigma[i])));
     let known: Vec<(f64, f64)> = axes.filter(|(_, sigma)| sigma.is_finite()).collect();
     let held = known.iter().filter(|(off, sigma)| *off <= BAND_SIGMAS * sigma).count();
     (!known.is_empty()).then(|| held as f64 / known.len() as f64)

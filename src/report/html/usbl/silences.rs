@@ -1,7 +1,8 @@
 //! The silences: how long, how well the track bridges them, how far the prediction strayed.
 
-use super::answer::duration;
+use super::prediction::Error;
 use crate::report::html::{Column, Table, value};
+use crate::report::usbl::duration;
 use crate::time::Time;
 use crate::track::{Phase, Track};
 
@@ -18,7 +19,7 @@ struct Silence {
 }
 
 /// The longest silences in order of time; `None` without any.
-pub(super) fn table(track: &Track, prediction: &Track, t0: Time) -> Option<Table> {
+pub(super) fn table(track: &Track, errors: &[Error], t0: Time) -> Option<Table> {
     let mut silences = silences(track);
     let count = silences.len();
     let length_s = |s: &Silence| s.span.1.seconds_since(s.span.0);
@@ -31,7 +32,7 @@ pub(super) fn table(track: &Track, prediction: &Track, t0: Time) -> Option<Table
             value(s.span.1.seconds_since(t0), 0),
             duration(length_s(s)),
             value(s.sigma_m, 1),
-            value(strayed_m(track, prediction, s.span), 1),
+            value(strayed_m(errors, s.span), 1),
         ]
     };
     let which =
@@ -59,15 +60,10 @@ fn silences(track: &Track) -> Vec<Silence> {
     silent.map(of).collect()
 }
 
-/// The greatest distance of the prediction from the track at the instants that both have.
-fn strayed_m(track: &Track, prediction: &Track, (from, to): (Time, Time)) -> Option<f64> {
-    let within = prediction.points.iter().filter(|p| p.time >= from && p.time <= to);
-    let off = within.filter_map(|p| {
-        let at = track.points.binary_search_by_key(&p.time, |q| q.time).ok()?;
-        let there = track.points[at].state.position;
-        Some(length([0, 1, 2].map(|i| p.state.position[i] - there[i])))
-    });
-    off.reduce(f64::max)
+/// The greatest distance of the prediction from the track between two instants.
+fn strayed_m(errors: &[Error], (from, to): (Time, Time)) -> Option<f64> {
+    let within = errors.iter().filter(|e| e.point.time >= from && e.point.time <= to);
+    within.map(Error::distance_m).reduce(f64::max)
 }
 
 fn length(v: [f64; 3]) -> f64 {
