@@ -222,11 +222,7 @@ fn write_page(out: &mut String, report: &UsblReport) -> fmt::Result {
     text::origin(out, track.origin)?;
     let prediction = &report.prediction;
     if let Some(off) = off(prediction) {
-        writeln!(
-            out,
-            "        a prediction by the past alone ({}) was {off} (root mean square)",
-            prediction.method
-        )?;
+        writeln!(out, "        rmse of a prediction by the past alone ({}): {off}", prediction.method)?;
     }
     writeln!(out)?;
     fixes(out, report)?;
@@ -249,12 +245,12 @@ pub(super) fn known(report: &UsblReport) -> String {
     report.phases.iter().map(of_phase).collect::<Vec<_>>().join(", ")
 }
 
-/// How far the prediction was off while fixes came and in silence; `None` where there is none to be held against the
+/// The root mean square error of the prediction while fixes came and in silence; `None` where there is none to be held against the
 /// track.
 pub(super) fn off(prediction: &PredictionReport) -> Option<String> {
-    let seen = prediction.rmse_m.map(|m| format!("{m:.1} m off while fixes came"));
-    let silent = prediction.silent_rmse_m.map(|m| format!("{m:.1} m off in silence"));
-    seen.into_iter().chain(silent).reduce(|a, b| format!("{a} and {b}"))
+    let seen = prediction.rmse_m.map(|m| format!("{m:.1} m while fixes came"));
+    let silent = prediction.silent_rmse_m.map(|m| format!("{m:.1} m in silence"));
+    seen.into_iter().chain(silent).reduce(|a, b| format!("{a}, {b}"))
 }
 
 /// In seconds, minutes or hours, whichever is read at a glance.
@@ -308,9 +304,60 @@ fn noise(report: &UsblReport) -> String {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
+    use super::*;
+    use crate::config::SourceConfig;
+    use crate::source::{SigmaOrigin, Timing};
+
+    /// A report of the dive, of fixes with a sigma of 1.5 m from the config.
+    pub(crate) fn report_of(dive: &Dive, fixes: &Source, plan: &DivePlan, t0: Time) -> UsblReport {
+        let loaded = Loaded {
+            config: SourceConfig { position: Some("/usbl.p".into()), ..SourceConfig::default() },
+            source: Source::default(),
+            frame_id: plan.frame_id.clone(),
+            fix_origin: None,
+            timing: Timing { clock: "stamp".into(), delay_s: 0.0, delay_spread_s: 0.0, delay_growth_s: 0.0 },
+            late: Vec::new(),
+            sigma: [Some((1.5, SigmaOrigin::Config)), None],
+            notes: Vec::new(),
+            warnings: Vec::new(),
+        };
+        UsblReport::new(&UsblParts {
+            input: "trials/in.mcap",
+            output: "out.mcap",
+            t0,
+            origin: None,
+            loaded: &loaded,
+            fixes,
+            depth: None,
+            plan,
+            dive,
+            notes: &[],
+            warnings: &[],
+        })
+    }
+
     #[test]
     fn the_schema_in_the_tree_is_that_of_this_code() {
         super::super::tests::assert_schema(&schemars::schema_for!(super::UsblReport), "usbl");
+    }
+
+    #[test]
+    fn a_length_of_time_is_told_in_the_unit_that_suits_it() {
+        assert_eq!(
+            [299.0, 300.0, 10_799.0, 90_000.0].map(duration),
+            ["299 s", "5.0 min", "180.0 min", "25.0 h"]
+        );
+    }
+
+    #[test]
+    fn a_prediction_is_told_of_where_there_is_one() {
+        let said = |rmse_m, silent_rmse_m| {
+            off(&PredictionReport { method: String::new(), points: 0, rmse_m, silent_rmse_m })
+        };
+        assert_eq!(said(None, None), None);
+        assert_eq!(said(Some(2.0), None).as_deref(), Some("2.0 m while fixes came"));
+        let both = said(Some(2.0), Some(30.0));
+        assert_eq!(both.as_deref(), Some("2.0 m while fixes came, 30.0 m in silence"));
     }
 }

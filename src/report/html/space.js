@@ -99,7 +99,10 @@ function drawSpace(place, space, tables) {
       ctx.lineWidth = 1;
       ctx.beginPath();
       if (cloud.style === "outliers") places.forEach(([x, y]) => addSign(ctx, cloud.ink.index, x, y, 2.4, 0));
-      else places.forEach(([x, y]) => ctx.fillRect(x - 0.8, y - 0.8, 1.6, 1.6));
+      else {
+        const half = places.length > 50 ? 0.8 : 1.6;
+        places.forEach(([x, y]) => ctx.fillRect(x - half, y - half, 2 * half, 2 * half));
+      }
       ctx.stroke();
     }
     // a line to a point has its phase's colour; one stroke a phase, since thousands would be slow to turn

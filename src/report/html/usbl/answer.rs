@@ -12,7 +12,7 @@ pub(super) fn sentences(report: &UsblReport, t0: Time) -> Vec<String> {
     let wild = fixes.off_by_itself + fixes.off_as_cycle + fixes.off_depth;
     let share = 100.0 * wild as f64 / report.source.positions.max(1) as f64;
     let predicted = off(&report.prediction).map_or(String::new(), |off| {
-        format!("A prediction by the past alone was {off} (root mean square). ")
+        format!("A prediction by the past alone was off by {off} (root mean square). ")
     });
     vec![
         format!(

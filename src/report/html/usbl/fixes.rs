@@ -33,14 +33,12 @@ fn of<'a>(parts: Parts<'a>, wanted: impl Fn(&Judged) -> bool) -> Vec<(&'a Sample
 
 /// The fixes that were thrown out, by reason.
 pub(super) fn thrown_out(parts: Parts<'_>) -> Vec<Rejected> {
-    let rejected = REASONS.iter().enumerate().map(|(i, (reason, label, _))| Rejected {
-        label,
-        quantity: Quantity::Position,
-        samples: of(parts, |j| j.reason == *reason).into_iter().map(|(fix, _)| *fix).collect(),
-        style: Style::Outliers,
-        ink: Ink::Rejected(i),
-    });
-    rejected.collect()
+    let rejected = |(i, (reason, label, _)): (usize, &(Reason, &'static str, &str))| {
+        let (style, ink) = sign(i);
+        let samples = of(parts, |j| j.reason == *reason).into_iter().map(|(fix, _)| *fix).collect();
+        Rejected { label, quantity: Quantity::Position, samples, style, ink }
+    };
+    REASONS.iter().enumerate().map(rejected).collect()
 }
 
 /// Numbers and plots.
@@ -48,9 +46,9 @@ pub(super) fn parts(drawing: &mut Drawing<'_>, parts: Parts<'_>) -> Vec<Part> {
     let mut source = parts.report.source.clone();
     // of one source there is nothing to be told apart
     source.datum = false;
-    let text = "Every fix at its time, in the row of what became of it; then how far it lies from the track in sigmas, those of \
-                the noise as it was found to be and of the track together: of fixes that are right 95 % lie below the dashed \
-                line, and between the two where the axes stand one by one.";
+    let text = "First every fix at its time, in the row of what became of it. Then its distance from the track in sigmas, those \
+                of the noise that was found and of the track together: 95 % of the fixes that are right lie below the dashed \
+                line. Then the kept fixes less the track, axis by axis: about 95 % lie between the dashed lines.";
     let shown = [strip(drawing, parts), lengths(drawing, parts), by_axis(drawing, parts)];
     vec![
         Part::Table(numbers(parts)),
@@ -70,9 +68,17 @@ fn add(drawing: &mut Drawing<'_>, rows: &[(f64, f64)]) -> Option<usize> {
     (!rows.is_empty()).then(|| drawing.add(columns))
 }
 
-/// A sign for every reason, dots without one.
-fn series(label: &str, table: usize, reason: Option<usize>) -> Series {
-    let (style, ink) = reason.map_or((Style::Dots, Ink::Source(0)), |i| (Style::Outliers, Ink::Rejected(i)));
+/// How fixes are drawn, and in which colour.
+type Look = (Style, Ink);
+
+const KEPT: Look = (Style::Dots, Ink::Source(0));
+
+/// That of what was thrown out, by the index of the reason.
+fn sign(reason: usize) -> Look {
+    (Style::Outliers, Ink::Rejected(reason))
+}
+
+fn series(label: &str, table: usize, (style, ink): Look) -> Series {
     Series { style, ..Drawing::dots(label, table, 0, ink) }
 }
 
@@ -92,21 +98,22 @@ fn plot(drawing: &Drawing<'_>, title: &str, y_label: &str, series: Vec<Series>) 
 fn strip(drawing: &mut Drawing<'_>, parts: Parts<'_>) -> Option<Plot> {
     type Wanted<'a> = &'a dyn Fn(&Judged) -> bool;
     let because = REASONS.map(|(reason, ..)| move |j: &Judged| j.reason == reason);
-    let mut all: Vec<(&str, &str, Option<usize>, Wanted<'_>)> = vec![
-        ("late", "late", None, &|j| j.late),
-        ("repeated", "repeated", None, &|j| j.reason == Reason::Repeated),
+    let plain = (Style::Dots, Ink::Plain);
+    let mut all: Vec<(&str, &str, Look, Wanted<'_>)> = vec![
+        ("late", "late", plain, &|j| j.late),
+        ("repeated", "repeated", plain, &|j| j.reason == Reason::Repeated),
     ];
     for (i, (_, label, name)) in REASONS.iter().enumerate().rev() {
-        all.push((label, name, Some(i), &because[i]));
+        all.push((label, name, sign(i), &because[i]));
     }
-    all.push(("kept", "kept", None, &|j| j.reason == Reason::Fits));
+    all.push(("kept", "kept", KEPT, &|j| j.reason == Reason::Fits));
     let (mut names, mut shown) = (Vec::new(), Vec::new());
-    for (label, name, reason, wanted) in all {
+    for (label, name, look, wanted) in all {
         let row = names.len() as f64;
         let rows: Vec<(f64, f64)> = of(parts, wanted).iter().map(|(fix, _)| (fix.time_s, row)).collect();
         let Some(table) = add(drawing, &rows) else { continue };
         names.push(name);
-        shown.push(series(label, table, reason));
+        shown.push(series(label, table, look));
     }
     let y_range = Some((-0.6, names.len() as f64 - 0.4));
     (!names.is_empty()).then(|| Plot {
@@ -119,12 +126,11 @@ fn strip(drawing: &mut Drawing<'_>, parts: Parts<'_>) -> Option<Plot> {
 /// The length of every residual in sigmas.
 fn lengths(drawing: &mut Drawing<'_>, parts: Parts<'_>) -> Option<Plot> {
     let mut shown = Vec::new();
-    for (reason, label, sign) in std::iter::once((Reason::Fits, "kept", None))
-        .chain(REASONS.iter().enumerate().map(|(i, (reason, label, _))| (*reason, *label, Some(i))))
-    {
+    let wild = REASONS.iter().enumerate().map(|(i, (reason, label, _))| (*reason, *label, sign(i)));
+    for (reason, label, look) in std::iter::once((Reason::Fits, "kept", KEPT)).chain(wild) {
         let found = of(parts, |j| j.reason == reason);
         let rows: Vec<(f64, f64)> = found.iter().map(|(fix, j)| (fix.time_s, j.residual_sigmas)).collect();
-        shown.extend(add(drawing, &rows).map(|table| series(label, table, sign)));
+        shown.extend(add(drawing, &rows).map(|table| series(label, table, look)));
     }
     (!shown.is_empty()).then(|| Plot {
         levels: vec![Level { value: LENGTH_95 }],

@@ -89,3 +89,6 @@ fn where_from(report: &UsblReport, known: &[(String, String)], config: &str) -> 
     said.extend(tables::place(&track.frame_id, track.origin));
     tables::again(said, config)
 }
+
+#[cfg(test)]
+mod tests;
