@@ -24,7 +24,7 @@ const REASONS: [(Reason, &str, &str); 3] = [
 ];
 
 /// The fixes with their verdicts that hold `wanted`, in order of time.
-fn of<'a>(parts: Parts<'a>, wanted: impl Fn(&Judged) -> bool) -> Vec<(&'a Sample, &'a Judged)> {
+fn of(parts: Parts<'_>, wanted: impl Fn(&Judged) -> bool) -> Vec<(&Sample, &Judged)> {
     let all = parts.fixes.iter().zip(&parts.dive.cleaned.judged);
     let mut found: Vec<_> = all.filter(|(_, judged)| wanted(judged)).collect();
     found.sort_by(|a, b| a.0.time_s.total_cmp(&b.0.time_s));
@@ -117,8 +117,8 @@ fn strip(drawing: &mut Drawing<'_>, parts: Parts<'_>) -> Option<Plot> {
     }
     let y_range = Some((-0.6, names.len() as f64 - 0.4));
     (!names.is_empty()).then(|| Plot {
-        y_range,
         names,
+        y_range,
         ..plot(drawing, "What became of the fixes, each at its time", "", shown)
     })
 }
