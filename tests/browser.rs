@@ -120,7 +120,7 @@ fn hostile_dive() -> Vec<u8> {
         let header =
             mcap::records::MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
         let [x, y, z] = fix.sample.value;
-        let message = serde_json::json!({ "frame_id": HOSTILE, "p": { "x": x, "y": y, "z": z } });
+        let message = serde_json::json!({ "frame_id": HOSTILE, "position": { "x": x, "y": y, "z": z } });
         log.write_to_known_channel(&header, message.to_string().as_bytes()).expect("a message");
     }
     log.finish().expect("a log");
