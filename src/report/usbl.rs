@@ -304,38 +304,8 @@ fn noise(report: &UsblReport) -> String {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::*;
-    use crate::config::SourceConfig;
-    use crate::source::{SigmaOrigin, Timing};
-
-    /// A report of the dive, of fixes with a sigma of 1.5 m from the config.
-    pub(crate) fn report_of(dive: &Dive, fixes: &Source, plan: &DivePlan, t0: Time) -> UsblReport {
-        let loaded = Loaded {
-            config: SourceConfig { position: Some("/usbl.p".into()), ..SourceConfig::default() },
-            source: Source::default(),
-            frame_id: plan.frame_id.clone(),
-            fix_origin: None,
-            timing: Timing { clock: "stamp".into(), delay_s: 0.0, delay_spread_s: 0.0, delay_growth_s: 0.0 },
-            late: Vec::new(),
-            sigma: [Some((1.5, SigmaOrigin::Config)), None],
-            notes: Vec::new(),
-            warnings: Vec::new(),
-        };
-        UsblReport::new(&UsblParts {
-            input: "trials/in.mcap",
-            output: "out.mcap",
-            t0,
-            origin: None,
-            loaded: &loaded,
-            fixes,
-            depth: None,
-            plan,
-            dive,
-            notes: &[],
-            warnings: &[],
-        })
-    }
 
     #[test]
     fn the_schema_in_the_tree_is_that_of_this_code() {

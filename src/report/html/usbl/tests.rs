@@ -1,11 +1,12 @@
 //! What the page of a dive with wild fixes, a late one and a silence shows.
 
 use super::*;
+use crate::config::SourceConfig;
 use crate::estimate::usbl::Settings;
 use crate::fusion::usbl::{Causal, DivePlan, clean};
+use crate::report::UsblParts;
 use crate::report::html::{Plot, Style, Table};
-use crate::report::usbl::tests::report_of;
-use crate::sample::Source;
+use crate::source::{Loaded, SigmaOrigin, Timing};
 
 /// An hour's third at 1 m/s, an exchange of three fixes every 20 s; one fix of every fifth exchange is 300 m off, the
 /// 15th exchange as a whole, nothing is heard from 600 s to 800 s, and one fix is there twice.
@@ -21,6 +22,34 @@ fn fixes() -> Vec<Sample> {
     let mut fixes: Vec<Sample> = heard.map(fix).collect();
     fixes.insert(6, fixes[5]);
     fixes
+}
+
+/// A report of the dive, of fixes with a sigma of 1.5 m from the config.
+fn report_of(dive: &Dive, fixes: &Source, plan: &DivePlan, t0: Time) -> UsblReport {
+    let loaded = Loaded {
+        config: SourceConfig { position: Some("/usbl.p".into()), ..SourceConfig::default() },
+        source: Source::default(),
+        frame_id: plan.frame_id.clone(),
+        fix_origin: None,
+        timing: Timing { clock: "stamp".into(), delay_s: 0.0, delay_spread_s: 0.0, delay_growth_s: 0.0 },
+        late: Vec::new(),
+        sigma: [Some((1.5, SigmaOrigin::Config)), None],
+        notes: Vec::new(),
+        warnings: Vec::new(),
+    };
+    UsblReport::new(&UsblParts {
+        input: "trials/in.mcap",
+        output: "out.mcap",
+        t0,
+        origin: None,
+        loaded: &loaded,
+        fixes,
+        depth: None,
+        plan,
+        dive,
+        notes: &[],
+        warnings: &[],
+    })
 }
 
 fn page_of(causal: Causal) -> Page {
