@@ -6,6 +6,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use trackfuse::simulate::{DiveConstants, UsblConstants, dive, watch_by_usbl};
+
 /// What runs in a browser that takes it for markup.
 const HOSTILE: &str = "</script><img src=x onerror=document.documentElement.dataset.ran=1>";
 
@@ -19,10 +23,10 @@ fn browser() -> Option<PathBuf> {
     found
 }
 
-/// Fuses a log into `folder` and opens the report; the page as the browser has it then.
-fn opened(browser: &Path, folder: &Path, args: &[&str]) -> String {
+/// Runs a command that writes into `folder` and opens its report; the page as the browser has it then.
+fn opened(browser: &Path, folder: &Path, command: &str, args: &[&str]) -> String {
     let done = Command::new(env!("CARGO_BIN_EXE_trackfuse"))
-        .arg("fuse")
+        .arg(command)
         .args(args)
         .args(["-o", "out.mcap", "--report", "report.html", "--force"])
         .current_dir(folder)
@@ -61,6 +65,7 @@ fn the_report_of_a_climb_is_drawn_without_a_complaint() {
     let page = opened(
         &browser,
         folder.path(),
+        "fuse",
         &[&of("steep_climb.mcap"), "--config", &of("steep_climb.config.toml")],
     );
     assert_drawn(&page);
@@ -76,11 +81,50 @@ fn nothing_that_a_log_or_a_config_says_runs_in_the_browser() {
          [[characteristic_point]]\nname = '{HOSTILE}'\nz_m = -1.0\n"
     );
     fs::write(folder.path().join("in.toml"), config).expect("a file");
-    let page = opened(&browser, folder.path(), &["in.mcap", "--config", "in.toml"]);
+    let page = opened(&browser, folder.path(), "fuse", &["in.mcap", "--config", "in.toml"]);
     assert_drawn(&page);
     assert!(!page.contains("data-ran"), "a script of the log ran");
     assert!(!page.contains("<img"), "an element of the log is in the page");
     assert!(page.matches("&lt;/script&gt;&lt;img").count() > 5, "its names are there to be read");
+}
+
+#[test]
+fn the_report_of_a_dive_is_drawn_and_nothing_that_its_log_says_runs() {
+    let Some(browser) = browser() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("in.mcap"), hostile_dive()).expect("a file");
+    for prediction in ["improved", "paper"] {
+        let config = format!("[usbl]\nsigma_m = 3.0\nprediction = \"{prediction}\"\n");
+        fs::write(folder.path().join("in.toml"), config).expect("a file");
+        let page = opened(&browser, folder.path(), "usbl", &["in.mcap", "--config", "in.toml"]);
+        assert_drawn(&page);
+        assert!(!page.contains("data-ran"), "a script of the log ran");
+        assert!(!page.contains("<img"), "an element of the log is in the page");
+        assert!(page.matches("&lt;/script&gt;&lt;img").count() > 2, "its names are there to be read");
+        for sign in ["× off by itself", "+ off with its exchange"] {
+            assert!(page.contains(sign), "{sign}");
+        }
+    }
+}
+
+/// A dive with wild fixes and a silence; its topic and its frame are markup.
+fn hostile_dive() -> Vec<u8> {
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let truth = dive(&DiveConstants::default(), &mut rng);
+    let watched = UsblConstants { wild_fixes: 0.3, wild_cycles: 0.05, ..UsblConstants::default() };
+    let mut log = mcap::Writer::new(std::io::Cursor::new(Vec::new())).expect("a writer");
+    let none = std::collections::BTreeMap::new();
+    let channel_id = log.add_channel(0, &format!("/usbl{HOSTILE}"), "json", &none).expect("a channel");
+    for fix in watch_by_usbl(&truth, 1800.0, &watched, &mut rng).fixes {
+        let time = 1_731_000_000_000_000_000 + (fix.sample.time_s * 1e9) as u64;
+        let header =
+            mcap::records::MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
+        let [x, y, z] = fix.sample.value;
+        let message = serde_json::json!({ "frame_id": HOSTILE, "position": { "x": x, "y": y, "z": z } });
+        log.write_to_known_channel(&header, message.to_string().as_bytes()).expect("a message");
+    }
+    log.finish().expect("a log");
+    log.into_inner().into_inner()
 }
 
 /// A rising sensor whose frame is markup, beside a topic whose name is.

@@ -13,6 +13,7 @@ use crate::printable::printable;
 use crate::sample::Source;
 use crate::source::Loaded;
 use crate::time::Time;
+use crate::track::Phase;
 
 /// The report of `usbl`. Nanoseconds are strings, since JSON numbers lose them.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -210,62 +211,123 @@ pub fn render_usbl(report: &UsblReport) -> String {
 }
 
 fn write_page(out: &mut String, report: &UsblReport) -> fmt::Result {
-    let (source, track, fixes) = (&report.source, &report.track, &report.fixes);
-    let paths = source.position.as_deref().map(printable).unwrap_or_default();
-    write!(out, "fixes   {} of {paths}, timed by {}", source.positions, source.clock)?;
-    if let (Some(sigma), Some(from)) = (source.position_sigma_m, &source.position_sigma_from) {
-        write!(out, ", sigma {sigma:.2} m ({from})")?;
-    }
-    writeln!(out)?;
-    writeln!(out, "        {} kept", fixes.kept)?;
-    for (count, why) in [
-        (fixes.off_by_itself, "thrown out: each off by itself"),
-        (fixes.off_as_cycle, "thrown out with their whole exchange"),
-        (fixes.off_depth, "thrown out: not at the depth sensor's depth"),
-        (fixes.repeated, "thrown out: they repeat another one"),
-        (fixes.late, "came late, and are not in the prediction"),
-    ] {
-        if count > 0 {
-            writeln!(out, "        {count} {why}")?;
-        }
-    }
-    let ExchangesReport { count, thrown_out, cycle_s } = report.exchanges;
-    writeln!(out, "        {count} exchanges, {cycle_s:.1} s apart; {thrown_out} thrown out as a whole")?;
-    if let Some(DepthReport { path, samples }) = &report.depth {
-        writeln!(out, "depth   {samples} of {}", printable(path))?;
-    }
-    writeln!(out)?;
-    let duration = track.span_s.1 - track.span_s.0;
-    write!(out, "track   {} points at {} Hz over {duration:.2} s", track.points, short(track.rate_hz))?;
+    let track = &report.track;
+    writeln!(out, "track   known to {} (1 sigma, over three axes)", known(report))?;
+    let span_s = track.span_s.1 - track.span_s.0;
+    write!(out, "        {} points at {} Hz over {span_s:.2} s", track.points, short(track.rate_hz))?;
     if !track.frame_id.is_empty() {
         write!(out, ", frame {:?}", track.frame_id)?;
     }
     writeln!(out)?;
     text::origin(out, track.origin)?;
-    let ([across, down], [q_across, q_down]) = (track.noise_scale, track.acceleration_density);
-    writeln!(
-        out,
-        "        noise / stated: {across:.2} {down:.2}; liveliness {q_across:.1e} {q_down:.1e} m2/s3 (horizontal, vertical)"
-    )?;
     let prediction = &report.prediction;
-    let off = |v: Option<f64>| v.map_or("-".into(), |v| format!("{v:.1} m"));
-    writeln!(
-        out,
-        "prediction by the past alone ({}): {} off the track while fixes come, {} in silence",
-        prediction.method,
-        off(prediction.rmse_m),
-        off(prediction.silent_rmse_m)
-    )?;
+    if let Some(off) = off(prediction) {
+        writeln!(out, "        rmse of a prediction by the past alone ({}): {off}", prediction.method)?;
+    }
+    writeln!(out)?;
+    fixes(out, report)?;
     writeln!(out)?;
     text::phases(out, &report.phases)?;
     text::notes(out, &report.notes)?;
     text::warnings(out, &report.warnings)
 }
 
+/// How well the place is known where fixes come and in silence.
+pub(super) fn known(report: &UsblReport) -> String {
+    let of_phase = |p: &PhaseReport| {
+        let sigma_m = p.position_sigma_m.map_or("unknown".into(), |s| format!("± {s:.1} m"));
+        if p.phase == Phase::Bridged.name() {
+            format!("{sigma_m} in {} of silence", duration(p.points as f64 / report.track.rate_hz))
+        } else {
+            format!("{sigma_m} where fixes come")
+        }
+    };
+    report.phases.iter().map(of_phase).collect::<Vec<_>>().join(", ")
+}
+
+/// The root mean square error of the prediction while fixes came and in silence; `None` where there is none to be held against the
+/// track.
+pub(super) fn off(prediction: &PredictionReport) -> Option<String> {
+    let seen = prediction.rmse_m.map(|m| format!("{m:.1} m while fixes came"));
+    let silent = prediction.silent_rmse_m.map(|m| format!("{m:.1} m in silence"));
+    seen.into_iter().chain(silent).reduce(|a, b| format!("{a}, {b}"))
+}
+
+/// In seconds, minutes or hours, whichever is read at a glance.
+pub(super) fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 300.0 => format!("{s:.0} s"),
+        s if s < 10_800.0 => format!("{:.1} min", s / 60.0),
+        s => format!("{:.1} h", s / 3600.0),
+    }
+}
+
+fn fixes(out: &mut String, report: &UsblReport) -> fmt::Result {
+    let (source, fixes) = (&report.source, &report.fixes);
+    let path = source.position.as_deref().map(printable).unwrap_or_default();
+    writeln!(out, "fixes   {} of {path}, timed by {}", source.positions, source.clock)?;
+    writeln!(out, "        {} kept; {}", fixes.kept, noise(report))?;
+    for (count, why) in [
+        (fixes.off_by_itself, "thrown out: each off by itself"),
+        (fixes.off_as_cycle, "thrown out with their whole exchange"),
+        (fixes.off_depth, "thrown out: not at the depth sensor's depth"),
+        (fixes.repeated, "passed over: they repeat another one"),
+        (fixes.late, "of all these came late, and are not in the prediction"),
+    ] {
+        if count > 0 {
+            writeln!(out, "        {count} {why}")?;
+        }
+    }
+    let ExchangesReport { count, thrown_out, cycle_s } = report.exchanges;
+    write!(out, "        {count} exchanges, {cycle_s:.1} s apart")?;
+    if thrown_out > 0 {
+        write!(out, "; {thrown_out} of them thrown out as a whole")?;
+    }
+    writeln!(out)?;
+    if let Some(DepthReport { path, samples }) = &report.depth {
+        writeln!(out, "depth   {samples} of {}", printable(path))?;
+    }
+    Ok(())
+}
+
+/// The noise of the fixes that were kept, beside what was stated.
+fn noise(report: &UsblReport) -> String {
+    let [across, down] = report.track.noise_scale;
+    match (report.source.position_sigma_m, &report.source.position_sigma_from) {
+        (Some(sigma), Some(from)) => format!(
+            "1 sigma of their noise is {:.2} m in x and y, {:.2} m in z ({sigma:.2} m: {from})",
+            across * sigma,
+            down * sigma
+        ),
+        _ => format!("their noise is {across:.2} times what was stated in x and y, {down:.2} times in z"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use super::*;
+
     #[test]
     fn the_schema_in_the_tree_is_that_of_this_code() {
         super::super::tests::assert_schema(&schemars::schema_for!(super::UsblReport), "usbl");
+    }
+
+    #[test]
+    fn a_length_of_time_is_told_in_the_unit_that_suits_it() {
+        assert_eq!(
+            [299.0, 300.0, 10_799.0, 90_000.0].map(duration),
+            ["299 s", "5.0 min", "180.0 min", "25.0 h"]
+        );
+    }
+
+    #[test]
+    fn a_prediction_is_told_of_where_there_is_one() {
+        let said = |rmse_m, silent_rmse_m| {
+            off(&PredictionReport { method: String::new(), points: 0, rmse_m, silent_rmse_m })
+        };
+        assert_eq!(said(None, None), None);
+        assert_eq!(said(Some(2.0), None).as_deref(), Some("2.0 m while fixes came"));
+        let both = said(Some(2.0), Some(30.0));
+        assert_eq!(both.as_deref(), Some("2.0 m while fixes came, 30.0 m in silence"));
     }
 }

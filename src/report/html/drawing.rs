@@ -1,7 +1,7 @@
 //! The track and the sources' samples as plots over time and in space.
 
 use super::data::thin;
-use super::{Band, Columns, Ink, Mark, Part, Plot, Series, Space, Style};
+use super::{Band, Cloud, Columns, Ink, Mark, Part, Plot, Series, Space, Style};
 use crate::fusion::Fusion;
 use crate::quality::BAND_SIGMAS;
 use crate::sample::{Quantity, Sample, Source};
@@ -21,7 +21,7 @@ const VELOCITY: usize = 4;
 const ACCELERATION: usize = 7;
 const POSITION_SIGMA: usize = 10;
 const VELOCITY_SIGMA: usize = 13;
-const PHASE: usize = 16;
+pub(super) const PHASE: usize = 16;
 
 /// Characteristic points in the view of space, the first ones: more can't be told apart.
 const MARKS: usize = 40;
@@ -33,14 +33,29 @@ pub(super) struct Drawn<'a> {
     pub(super) fusion: &'a Fusion,
     /// The sources as they were read, in the order of their bits.
     pub(super) sources: &'a [Source],
-    /// What of them was rejected, in order of time: positions, velocities.
-    pub(super) rejected: [&'a [Sample]; 2],
+    /// What of them was rejected.
+    pub(super) rejected: &'a [Rejected],
     /// Points of the track a second.
     pub(super) rate_hz: f64,
     /// The instant that samples count from.
     pub(super) origin: Time,
     /// T0, from which the page's times count.
     pub(super) t0: Time,
+}
+
+/// Samples that the track doesn't rest on.
+#[derive(Clone, Debug)]
+pub(super) struct Rejected {
+    /// What they are called.
+    pub(super) label: &'static str,
+    /// What they are of.
+    pub(super) quantity: Quantity,
+    /// In order of time.
+    pub(super) samples: Vec<Sample>,
+    /// How they are drawn.
+    pub(super) style: Style,
+    /// In which colour.
+    pub(super) ink: Ink,
 }
 
 impl Drawn<'_> {
@@ -54,22 +69,23 @@ impl Drawn<'_> {
 pub(super) struct Drawing<'a> {
     pub(super) parts: Drawn<'a>,
     tables: Vec<Columns>,
-    track: usize,
+    pub(super) track: usize,
     /// By source and quantity.
     samples: Vec<[Option<usize>; 2]>,
-    rejected: [Option<usize>; 2],
+    rejected: Vec<Option<usize>>,
 }
 
 impl<'a> Drawing<'a> {
     pub(super) fn new(parts: Drawn<'a>) -> Self {
         let mut drawing =
-            Self { parts, tables: Vec::new(), track: 0, samples: Vec::new(), rejected: [None; 2] };
+            Self { parts, tables: Vec::new(), track: 0, samples: Vec::new(), rejected: Vec::new() };
         drawing.track = drawing.add_track();
         for source in parts.sources {
             let tables = Quantity::ALL.map(|q| drawing.add_samples(source.series(q), SAMPLE_ROWS));
             drawing.samples.push(tables);
         }
-        drawing.rejected = parts.rejected.map(|rejected| drawing.add_samples(rejected, SAMPLE_ROWS));
+        drawing.rejected =
+            parts.rejected.iter().map(|r| drawing.add_samples(&r.samples, SAMPLE_ROWS)).collect();
         drawing
     }
 
@@ -133,19 +149,21 @@ impl<'a> Drawing<'a> {
         Series { label, table, x: 0, y: axis + 1, style, ink, band: None, phase: None }
     }
 
-    /// Position, velocity and acceleration by axis, behind what the reader must know to read them.
-    pub(super) fn motion(&self) -> Vec<Part> {
-        let text = "Lines are the track, in the colour of its phase, with its 95 % band; dots are the sources' samples as they \
-                    were read. Drag across a plot to zoom in, double-click to see all; the cursor reads all plots at one \
-                    instant; a name below a plot hides or shows what it names. Of long series at most about 4000 points \
-                    are drawn: from stretches of equal length those with the least and the greatest value of each axis, so \
-                    that no outlier is left out.";
+    /// The first so many of position, velocity and acceleration by axis, behind what the reader must know to read them;
+    /// `beside` says what is drawn beside the track.
+    pub(super) fn motion(&self, count: usize, beside: &str) -> Vec<Part> {
+        let text = format!(
+            "Lines are the track, in the colour of its phase, with its 95 % band; {beside} Drag across a plot to zoom in, \
+             double-click to see all; the cursor reads all plots at one instant; a name below a plot hides or shows what \
+             it names. Of long series at most about 4000 points are drawn: from stretches of equal length those with the \
+             least and the greatest value of each axis, so that no outlier is left out."
+        );
         let kinds = [
             ("position", "m", POSITION, Some(POSITION_SIGMA), Some(Quantity::Position)),
             ("velocity", "m/s", VELOCITY, Some(VELOCITY_SIGMA), Some(Quantity::Velocity)),
             ("acceleration", "m/s²", ACCELERATION, None, None),
         ];
-        let plots = kinds.map(|(kind, unit, column, sigma, quantity)| {
+        let plots = kinds.into_iter().take(count).map(|(kind, unit, column, sigma, quantity)| {
             let plot = |axis: usize| {
                 let mut series: Vec<Series> = quantity.map_or(Vec::new(), |q| self.measured(q, axis));
                 series.push(Series {
@@ -163,15 +181,13 @@ impl<'a> Drawing<'a> {
                     x_label: "s since T0",
                     y_label: unit.into(),
                     series,
-                    levels: Vec::new(),
-                    range: None,
-                    y_range: None,
                     group: "motion",
+                    ..Plot::default()
                 }
             };
             Part::Plots(1, (0..3).map(plot).collect())
         });
-        [Part::Text(text.into())].into_iter().chain(plots).collect()
+        [Part::Text(text)].into_iter().chain(plots).collect()
     }
 
     /// What the sources measured on one axis, and what of it was rejected.
@@ -181,10 +197,17 @@ impl<'a> Drawing<'a> {
             Some(Self::dots(&self.parts.sources[i].name, table, axis, Ink::Source(i)))
         };
         let mut series: Vec<Series> = self.samples.iter().enumerate().filter_map(of_source).collect();
-        series.extend(
-            self.rejected[quantity as usize].map(|table| Self::dots("rejected", table, axis, Ink::Plain)),
-        );
+        series.extend(self.rejected(quantity).map(|(rejected, table)| Series {
+            style: rejected.style,
+            ..Self::dots(rejected.label, table, axis, rejected.ink)
+        }));
         series
+    }
+
+    /// What was rejected of this quantity, and its table.
+    fn rejected(&self, quantity: Quantity) -> impl Iterator<Item = (&'a Rejected, usize)> {
+        let of = self.parts.rejected.iter().zip(&self.rejected).filter(move |(r, _)| r.quantity == quantity);
+        of.filter_map(|(rejected, table)| Some((rejected, (*table)?)))
     }
 
     /// The view of space, and what stands above it.
@@ -205,8 +228,14 @@ impl<'a> Drawing<'a> {
             "" => "a frame that the log doesn't name".to_owned(),
             frame => format!("frame {frame:?}"),
         };
-        let of_source =
-            |(i, tables): (usize, &[Option<usize>; 2])| Some((sources[i].name.clone(), tables[0]?));
+        let of_source = |(i, tables): (usize, &[Option<usize>; 2])| {
+            let (label, ink) = (sources[i].name.clone(), Ink::Source(i));
+            Some(Cloud { label, table: tables[0]?, style: Style::Dots, ink })
+        };
+        let rejected = self.rejected(Quantity::Position).map(|(rejected, table)| {
+            let Rejected { label, style, ink, .. } = rejected;
+            Cloud { label: (*label).into(), table, style: *style, ink: *ink }
+        });
         let space = Space {
             title: format!(
                 "The track by phase, the sources' samples beside it, in {frame}; equal axes, metres"
@@ -214,7 +243,7 @@ impl<'a> Drawing<'a> {
             track: self.track,
             phase: PHASE,
             band: Band { sigma: POSITION_SIGMA, sigmas: BAND_SIGMAS },
-            sources: self.samples.iter().enumerate().filter_map(of_source).collect(),
+            clouds: self.samples.iter().enumerate().filter_map(of_source).chain(rejected).collect(),
             marks: events.chain(end).filter(|m| m.at.iter().all(|v| v.is_finite())).collect(),
         };
         vec![Part::Space(space)]
@@ -223,7 +252,11 @@ impl<'a> Drawing<'a> {
 
 /// The rows with the points beside every change of phase and every gap longer than `max_step_s`, and a row of nothing in
 /// the gaps; of changes more often than can be seen only the first ones.
-fn with_borders(points: &[TrackPoint], mut kept: Vec<usize>, max_step_s: f64) -> Vec<Option<usize>> {
+pub(super) fn with_borders(
+    points: &[TrackPoint],
+    mut kept: Vec<usize>,
+    max_step_s: f64,
+) -> Vec<Option<usize>> {
     let is_gap = |i: usize| points[i].time.seconds_since(points[i - 1].time) > max_step_s;
     let gaps: Vec<usize> = (1..points.len()).filter(|&i| is_gap(i)).collect();
     let changes = (1..points.len()).filter(|&i| points[i].phase != points[i - 1].phase);

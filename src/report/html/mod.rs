@@ -17,9 +17,10 @@ mod page;
 mod plot;
 mod secured;
 mod table;
+mod tables;
 pub mod usbl;
 
 pub use data::Columns;
 pub use page::{Page, Part, Section};
-pub use plot::{Band, Ink, Level, Mark, Plot, Series, Space, Style};
+pub use plot::{Band, Cloud, Ink, Level, Mark, Plot, Series, Space, Style};
 pub use table::{Column, Table, plus_minus, value};

@@ -7,14 +7,18 @@ use super::secured::{embedded, policy};
 use super::{Columns, Plot, Space, Table};
 use crate::printable::printable;
 
-/// uPlot with its licence, which asks to go with every copy.
-const UPLOT: &str =
-    concat!("/*\n", include_str!("uplot/LICENSE"), "*/\n", include_str!("uplot/uPlot.iife.min.js"));
+/// uPlot with its licence, which asks to go with every copy, behind what tells it how sharp to draw.
+const UPLOT: &str = concat!(
+    include_str!("theme.js"),
+    "/*\n",
+    include_str!("uplot/LICENSE"),
+    "*/\n",
+    include_str!("uplot/uPlot.iife.min.js")
+);
 const UPLOT_STYLE: &str = include_str!("uplot/uPlot.min.css");
 const STYLE: &str = include_str!("page.css");
 /// In the order in which they need each other.
-const SCRIPTS: [&str; 4] =
-    [include_str!("theme.js"), include_str!("plot.js"), include_str!("space.js"), include_str!("page.js")];
+const SCRIPTS: [&str; 3] = [include_str!("plot.js"), include_str!("space.js"), include_str!("page.js")];
 
 /// A report for a browser.
 #[derive(Clone, Debug, Default)]
@@ -135,6 +139,12 @@ impl Page {
 }
 
 impl Section {
+    /// A section.
+    #[must_use]
+    pub fn new(id: &'static str, title: &'static str, parts: Vec<Part>) -> Self {
+        Self { id, title, parts }
+    }
+
     fn markup(&self) -> Markup {
         html! {
             section id=(self.id) {
@@ -153,6 +163,11 @@ impl Section {
             }
         }
     }
+}
+
+/// The last part of a path, whatever system it is of.
+pub(super) fn file_name(path: &str) -> &str {
+    path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
 /// Where a script draws.
@@ -185,10 +200,8 @@ mod tests {
             x_label: "s",
             y_label: said(),
             series: vec![series],
-            levels: Vec::new(),
-            range: None,
-            y_range: None,
             group: "motion",
+            ..Plot::default()
         };
         let table = Table { caption: said(), columns: vec![Column::words("what")], rows: vec![vec![said()]] };
         let parts =

@@ -25,7 +25,7 @@ function stretches(times, phases) {
 /** What uPlot draws of a plot of the report: its series, their tables, and the phases on the ground. */
 function prepared(plot, tables) {
   const series = [], joined = [], bands = [];
-  let ground = [];
+  let ground = plot.ground ? stretches(tables[plot.ground[0]][0], tables[plot.ground[0]][plot.ground[1]]) : [];
   const add = (x, y, options) => {
     joined.push([x, y]);
     return series.push(options);
@@ -38,12 +38,20 @@ function prepared(plot, tables) {
         const sigma = table[s.band.sigma][i];
         return v === null || sigma === null ? null : v + sign * s.band.sigmas * sigma;
       });
-      const line = { stroke: () => faded(color("faint"), 0.55), width: 0.5, points: { show: false } };
-      const upper = add(x, edge(1), { ...line, label: "95 % band", isBand: true, class: "band" });
+      // beside a line of its own a band has its scale
+      const isOutlier = s.style === "band";
+      const line = { stroke: () => faded(color("faint"), 0.55), width: 0.5, points: { show: false }, auto: !isOutlier, isOutlier };
+      const upper = add(x, edge(1), { ...line, label: s.style === "band" ? s.label : "95 % band", isBand: true, class: "band" });
       const lower = add(x, edge(-1), { ...line, label: "lower edge", class: "lower" });
       bands.push({ series: [upper, lower], fill: () => faded(color("faint"), 0.25) });
     }
-    if (phases) {
+    if (s.style === "band") continue;
+    if (s.style === "outliers") {
+      const stroke = () => ink(s.ink);
+      const size = x.length > 1000 ? 1.4 : x.length > 200 ? 2.2 : 3.2;
+      const points = { show: true, size: 2 * size, width: 1.2, fill: stroke, stroke, paths: (u, i, from, to) => signs(u, i, from, to, s.ink.index, size) };
+      add(x, y, { label: SIGNS[s.ink.index % 3] + " " + s.label, stroke, width: 0, paths: () => null, points, auto: false, isOutlier: true });
+    } else if (phases) {
       ground = stretches(x, phases);
       for (const { column, phase } of byPhase(y, phases)) {
         const stroke = () => color(PHASES[phase]);
@@ -51,7 +59,7 @@ function prepared(plot, tables) {
       }
     } else {
       const stroke = () => ink(s.ink);
-      const isDots = s.style === "dots", size = s.ink.of === "plain" ? 6 : y.length > 1000 ? 2 : 3;
+      const isDots = s.style === "dots", size = s.ink.of === "plain" ? 6 : y.length > 1000 ? 2 : y.length > 50 ? 3 : 5;
       add(x, y, {
         label: s.label, stroke, width: isDots ? 0 : 1.5, paths: isDots ? () => null : undefined,
         points: { show: isDots, size, width: 0, fill: stroke, stroke },
@@ -61,6 +69,18 @@ function prepared(plot, tables) {
   // 2: what one table leaves out between two gaps of another is in the gap, too
   const data = joined.length ? uPlot.join(joined, joined.map(() => [1, 2])) : [[]];
   return { series, bands, ground, data };
+}
+
+/** The signs of what was thrown out; those beyond the plot are arrows at its edge. */
+function signs(u, series, from, to, index, size) {
+  const path = new Path2D(), r = size * sharpness, { top, height } = u.bbox, { min, max } = u.scales.x;
+  for (let i = from; i <= to; i++) {
+    const x = u.data[0][i], value = u.data[series][i];
+    if (value == null || x < min || x > max) continue;
+    const y = u.valToPos(value, "y", true), beyond = y < top ? 1 : y > top + height ? -1 : 0;
+    addSign(path, index, u.valToPos(x, "x", true), Math.max(top + r, Math.min(top + height - r, y)), r, beyond);
+  }
+  return { stroke: path, fill: null, clip: null, flags: 2 };
 }
 
 /** The nearest place to a cursor at which a series has a value, if one is near. */
@@ -85,6 +105,13 @@ function tick(v) {
 
 function digits(v) {
   return v == null ? DASH : Math.abs(v) >= 1e6 ? v.toExponential(3) : v.toFixed(Math.abs(v) >= 1000 ? 1 : 3);
+}
+
+/** What an axis has where names stand in place of numbers. */
+function named(names) {
+  if (!names.length) return {};
+  const splits = () => names.map((_, i) => i);
+  return { size: 74, label: undefined, splits, values: () => names };
 }
 
 /** Draws a plot of the report into `place`. */
@@ -137,7 +164,7 @@ function drawPlot(place, plot, tables) {
     ...size(),
     series: [{ label: plot.x_label, value: (u, v) => digits(v) }, ...series.map((s) => ({ value: (u, v) => digits(v), ...s }))],
     bands,
-    axes: [axis(plot.x_label), { ...axis(plot.y_label), size: 56 }],
+    axes: [axis(plot.x_label), { ...axis(plot.y_label), size: 56, ...named(plot.names) }],
     scales: { x: { time: false, range: (u, low, high) => (low === null ? [0, 1] : [low, high]) }, y: { range } },
     cursor: { dataIdx: nearest, sync: { key: plot.group, scales: ["x", null] }, points: { size: 7 }, drag: { x: true, y: false, dist: 8 } },
     legend: { markers: { width: 0, fill: (u, i) => legendColor(u.series[i]) } },
@@ -145,6 +172,12 @@ function drawPlot(place, plot, tables) {
   };
   const made = new uPlot(options, data, place);
   if (plot.range) made.setScale("x", { min: plot.range[0], max: plot.range[1] });
+  // before uPlot shows all the time: where it is shown already, room is made for what was thrown out, or taken away
+  made.over.addEventListener("dblclick", () => {
+    const { min, max } = made.scales.x, times = made.data[0];
+    if (min > times[0] || max < times[times.length - 1]) return;
+    made.series.forEach((s) => { if (s.isOutlier) s.auto = !s.auto; });
+  }, true);
   return { fit: () => made.setSize(size()), destroy: () => made.destroy() };
 }
 

@@ -12,6 +12,8 @@ pub enum Ink {
     Source(usize),
     /// That of an axis.
     Axis(usize),
+    /// That of what was thrown out, by the index of the reason; it has a sign of its own, too.
+    Rejected(usize),
     /// That of text.
     Plain,
 }
@@ -24,6 +26,10 @@ pub enum Style {
     Line,
     /// A dot a sample.
     Dots,
+    /// A sign a sample that was thrown out. It doesn't stretch the plot: what lies beyond stands at the edge.
+    Outliers,
+    /// The band alone.
+    Band,
 }
 
 /// A standard deviation, and the width of the band that is drawn of it.
@@ -64,7 +70,7 @@ pub struct Level {
 }
 
 /// One plot.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Plot {
     /// What it shows.
     pub title: String,
@@ -76,6 +82,10 @@ pub struct Plot {
     pub series: Vec<Series>,
     /// Dashed lines.
     pub levels: Vec<Level>,
+    /// Table and column of the phase on the ground, where no series has it; the time is the table's first column.
+    pub ground: Option<(usize, usize)>,
+    /// What stands at the ordinates 0, 1 .. in place of numbers; empty for numbers.
+    pub names: Vec<&'static str>,
     /// The part of the abscissa that is shown at first; `None` for all.
     pub range: Option<(f64, f64)>,
     /// The part of the ordinate that is shown; `None` for what the series need.
@@ -97,6 +107,19 @@ pub struct Mark {
     pub phase: usize,
 }
 
+/// Places in the view of space.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Cloud {
+    /// What they are called.
+    pub label: String,
+    /// Their table; its columns 1 to 3 are x, y and z.
+    pub table: usize,
+    /// Dots or outliers.
+    pub style: Style,
+    /// In which colour.
+    pub ink: Ink,
+}
+
 /// A view of space, turned and zoomed by hand, with equal axes in metres.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Space {
@@ -108,8 +131,8 @@ pub struct Space {
     pub phase: usize,
     /// Its first column of three standard deviations, and how wide a band is.
     pub band: Band,
-    /// Names and tables of the sources; their columns 1 to 3 are x, y and z.
-    pub sources: Vec<(String, usize)>,
+    /// What was measured.
+    pub clouds: Vec<Cloud>,
     /// Characteristic points.
     pub marks: Vec<Mark>,
 }

@@ -93,13 +93,18 @@ function drawSpace(place, space, tables) {
     });
     ctx.fillStyle = faded(color("faint"), 0.22);
     ctx.fill();
-    space.sources.forEach(([, table], index) => {
-      ctx.fillStyle = ink({ of: "source", index });
-      tables[table][0].forEach((_, i) => {
-        const [x, y] = to(point(tables[table], i));
-        ctx.fillRect(x - 0.8, y - 0.8, 1.6, 1.6);
-      });
-    });
+    for (const cloud of space.clouds) {
+      const places = tables[cloud.table][0].map((_, i) => to(point(tables[cloud.table], i)));
+      ctx.fillStyle = ctx.strokeStyle = ink(cloud.ink);
+      ctx.lineWidth = 1;
+      ctx.beginPath();
+      if (cloud.style === "outliers") places.forEach(([x, y]) => addSign(ctx, cloud.ink.index, x, y, 2.4, 0));
+      else {
+        const half = places.length > 50 ? 0.8 : 1.6;
+        places.forEach(([x, y]) => ctx.fillRect(x - half, y - half, 2 * half, 2 * half));
+      }
+      ctx.stroke();
+    }
     // a line to a point has its phase's colour; one stroke a phase, since thousands would be slow to turn
     let run = [], phase = phases[0];
     const stroke = () => run.length > 1 && line(run, color(PHASES[phase]), 2.2);
@@ -189,13 +194,13 @@ function drawSpace(place, space, tables) {
   button("+", () => { view.zoom *= 1.3; });
   button("−", () => { view.zoom /= 1.3; });
   const key = element(place, "div", "key");
-  const entry = (name, shade) => {
-    const sign = element(key, "span");
-    element(sign, "b", "", "■ ").style.color = shade;
-    sign.append(name);
+  const entry = (name, shade, sign = "■") => {
+    const made = element(key, "span");
+    element(made, "b", "", sign + " ").style.color = shade;
+    made.append(name);
   };
   PHASES.filter((_, phase) => phases.includes(phase)).forEach((name) => entry(name, color(name)));
-  space.sources.forEach(([name], index) => entry(name, ink({ of: "source", index })));
+  for (const { label, style, ink: of } of space.clouds) entry(label, ink(of), style === "outliers" ? SIGNS[of.index % 3] : undefined);
   entry("95 % band", faded(color("faint"), 0.4));
   draw();
   return { fit: draw, destroy: () => place.replaceChildren() };

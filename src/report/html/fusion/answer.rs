@@ -1,6 +1,6 @@
 //! The answer in two sentences.
 
-use super::tables::decimals;
+use crate::report::html::tables::decimals;
 use crate::report::html::{plus_minus, value};
 use crate::report::{PhaseReport, Report, SourceReport};
 use crate::time::Time;

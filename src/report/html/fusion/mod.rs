@@ -3,10 +3,12 @@
 mod answer;
 mod overlap;
 mod residuals;
-pub(super) mod tables;
+mod tables;
 
-use super::drawing::{Drawing, Drawn};
-use super::{Page, Part, Section};
+use super::drawing::{Drawing, Drawn, Rejected};
+use super::page::file_name;
+use super::tables as shared;
+use super::{Ink, Page, Part, Section, Style};
 use crate::fusion::Fusion;
 use crate::report::Report;
 use crate::sample::{Quantity, Sample, Source};
@@ -48,24 +50,29 @@ impl Parts<'_> {
 pub fn page(parts: Parts<'_>, provenance: &[(String, String)], config: &str) -> Page {
     let report = parts.report;
     let Parts { fusion, sources, origin, t0, .. } = parts;
-    let [positions, velocities] = Quantity::ALL.map(|quantity| parts.rejected(quantity));
-    let rejected = [&positions[..], &velocities];
-    let mut drawing =
-        Drawing::new(Drawn { fusion, sources, rejected, rate_hz: report.track.rate_hz, origin, t0 });
+    let rejected = Quantity::ALL.map(|quantity| Rejected {
+        label: "rejected",
+        quantity,
+        samples: parts.rejected(quantity),
+        style: Style::Dots,
+        ink: Ink::Plain,
+    });
+    let rate_hz = report.track.rate_hz;
+    let mut drawing = Drawing::new(Drawn { fusion, sources, rejected: &rejected, rate_hz, origin, t0 });
     let sections = vec![
-        section("space", "Track in space", drawing.in_space()),
-        section("motion", "Position, velocity, acceleration", {
-            let mut shown = drawing.motion();
-            shown.extend([tables::phases(&report.phases), tables::sources(&report.sources)].map(Part::Table));
+        Section::new("space", "Track in space", drawing.in_space()),
+        Section::new("motion", "Position, velocity, acceleration", {
+            let mut shown = drawing.motion(3, "dots are the sources' samples as they were read.");
+            shown.extend([shared::phases(&report.phases), shared::sources(&report.sources)].map(Part::Table));
             shown.extend(tables::remarks(report).into_iter().map(Part::Text));
             shown
         }),
-        section("overlap", "Overlap of the sources", overlap::parts(&mut drawing, report)),
-        section("residuals", "Residuals", residuals::parts(&mut drawing, report)),
-        section("errors", "Estimated errors", tables::errors(report)),
-        section("points", "Characteristic points", vec![tables::characteristic_points(report)]),
-        section("extrapolation", "Hold-out of the extrapolation", tables::holdout(report)),
-        section("provenance", "Provenance", tables::provenance(report, provenance, config)),
+        Section::new("overlap", "Overlap of the sources", overlap::parts(&mut drawing, report)),
+        Section::new("residuals", "Residuals", residuals::parts(&mut drawing, report)),
+        Section::new("errors", "Estimated errors", tables::errors(report)),
+        Section::new("points", "Characteristic points", vec![tables::characteristic_points(report)]),
+        Section::new("extrapolation", "Hold-out of the extrapolation", tables::holdout(report)),
+        Section::new("provenance", "Provenance", tables::provenance(report, provenance, config)),
     ];
     Page {
         title: file_name(&report.input).into(),
@@ -77,13 +84,4 @@ pub fn page(parts: Parts<'_>, provenance: &[(String, String)], config: &str) -> 
         tables: drawing.into_tables(),
         json: serde_json::to_value(report).unwrap_or_default(),
     }
-}
-
-pub(super) fn section(id: &'static str, title: &'static str, parts: Vec<Part>) -> Section {
-    Section { id, title, parts }
-}
-
-/// The last part of a path, whatever system it is of.
-pub(super) fn file_name(path: &str) -> &str {
-    path.rsplit(['/', '\\']).next().unwrap_or(path)
 }

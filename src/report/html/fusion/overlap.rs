@@ -140,6 +140,7 @@ fn plots(quantity: Quantity, stages: &[Stage], range: (f64, f64)) -> Vec<Plot> {
                 range: Some(range),
                 y_range: Some((low - room, high + room)),
                 group: "overlap",
+                ..Plot::default()
             });
         }
     }

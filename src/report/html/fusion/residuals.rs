@@ -33,9 +33,8 @@ pub(super) fn parts(drawing: &mut Drawing<'_>, report: &Report) -> Vec<Part> {
                 y_label: quantity.unit().into(),
                 series: (0..3).map(|axis| Drawing::dots(AXES[axis], table, axis, Ink::Axis(axis))).collect(),
                 levels: about_zero(sigma(drawing, report, i, quantity)),
-                range: None,
-                y_range: None,
                 group: "residuals",
+                ..Plot::default()
             });
             plots.push(correlation(drawing, &of, &left));
         }
@@ -81,8 +80,7 @@ fn correlation(drawing: &mut Drawing<'_>, of: &str, left: &[Sample]) -> Plot {
         y_label: "r".into(),
         series: (0..3).map(series).collect(),
         levels: about_zero(Some((left.len() as f64).sqrt().recip())),
-        range: None,
-        y_range: None,
         group: "lags",
+        ..Plot::default()
     }
 }

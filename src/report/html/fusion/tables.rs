@@ -1,81 +1,9 @@
 //! The report's numbers as tables: those of `--json`, for people.
 
-use crate::report::html::table::NONE;
+use crate::report::html::tables::{self, decimals};
 use crate::report::html::{Column, Part, Table, plus_minus, value};
 use crate::report::text::short;
-use crate::report::{LawReport, PhaseReport, Report, SourceReport, UnknownReport};
-
-/// The track phase by phase.
-pub(in super::super) fn phases(phases: &[PhaseReport]) -> Table {
-    let rows = phases.iter().map(|p| {
-        let name =
-            if p.stretches > 1 { format!("{} ({} parts)", p.phase, p.stretches) } else { p.phase.clone() };
-        vec![
-            name,
-            if p.sources.is_empty() { NONE.into() } else { p.sources.join(" + ") },
-            span(Some(p.span_s)),
-            p.points.to_string(),
-            value(p.position_sigma_m, 3),
-            value(p.velocity_sigma_m_s, 3),
-            value(p.position_rmse_m, 3),
-            value(p.velocity_rmse_m_s, 3),
-        ]
-    });
-    Table {
-        caption: "Phases: 1 sigma of the track, and how far the samples lie from it (root mean square), over three axes".into(),
-        columns: vec![
-            Column::words("phase"),
-            Column::words("seen by"),
-            Column::numbers("from .. to s"),
-            Column::numbers("points"),
-            Column::numbers("1 sigma m"),
-            Column::numbers("1 sigma m/s"),
-            Column::numbers("samples off m"),
-            Column::numbers("samples off m/s"),
-        ],
-        rows: rows.collect(),
-    }
-}
-
-fn span(span_s: Option<(f64, f64)>) -> String {
-    span_s.map_or(NONE.into(), |(from, to)| format!("{} .. {}", value(from, 2), value(to, 2)))
-}
-
-/// The sources.
-pub(in super::super) fn sources(sources: &[SourceReport]) -> Table {
-    let rows = sources.iter().map(|s| {
-        let sigma = |sigma: Option<f64>, from: &Option<String>| {
-            from.as_ref().map_or(value(sigma, 3), |from| format!("{} ({from})", value(sigma, 3)))
-        };
-        let paths: Vec<&str> = [&s.position, &s.velocity].into_iter().flatten().map(String::as_str).collect();
-        vec![
-            if s.datum { format!("{} (datum)", s.name) } else { s.name.clone() },
-            paths.join(", "),
-            format!("{}, {}", s.positions, s.velocities),
-            value(s.rate_hz, 2),
-            span(s.span_s),
-            s.clock.clone(),
-            plus_minus(1e3 * s.delay_s, 1e3 * s.delay_spread_s, 1),
-            sigma(s.position_sigma_m, &s.position_sigma_from),
-            sigma(s.velocity_sigma_m_s, &s.velocity_sigma_from),
-        ]
-    });
-    Table {
-        caption: "Sources".into(),
-        columns: vec![
-            Column::words("source"),
-            Column::words("message paths"),
-            Column::numbers("positions, velocities"),
-            Column::numbers("Hz"),
-            Column::numbers("from .. to s"),
-            Column::words("clock"),
-            Column::numbers("log - sample ms"),
-            Column::numbers("noise m"),
-            Column::numbers("noise m/s"),
-        ],
-        rows: rows.collect(),
-    }
-}
+use crate::report::{LawReport, Report, UnknownReport};
 
 /// What the tables of sources and phases don't say.
 pub(super) fn remarks(report: &Report) -> Vec<String> {
@@ -177,11 +105,6 @@ fn unknowns(unknowns: &[UnknownReport]) -> Table {
     }
 }
 
-/// Such that a sigma has two significant digits.
-pub(super) fn decimals(sigma: f64) -> usize {
-    if sigma > 0.0 && sigma.is_finite() { (1.0 - sigma.log10().floor()).clamp(0.0, 6.0) as usize } else { 3 }
-}
-
 /// The characteristic points that were reached.
 pub(super) fn characteristic_points(report: &Report) -> Part {
     let points = &report.characteristic_points;
@@ -266,35 +189,17 @@ pub(super) fn holdout(report: &Report) -> Vec<Part> {
 /// What made the page, of what.
 pub(super) fn provenance(report: &Report, known: &[(String, String)], config: &str) -> Vec<Part> {
     let track = &report.track;
-    let mut rows: Vec<Vec<String>> = Vec::new();
-    let mut say = |what: &str, value: String| rows.push(vec![what.to_owned(), value]);
-    say("input", report.input.clone());
-    say("output", report.output.clone());
-    for (what, value) in known {
-        say(what, value.clone());
-    }
-    say("T0, ns", report.t0_ns.clone());
+    let mut said = vec![tables::said("input", &report.input), tables::said("output", &report.output)];
+    said.extend_from_slice(known);
+    said.push(tables::said("T0, ns", &report.t0_ns));
     let rate = short(track.rate_hz);
-    say("track", format!("{} ({}), {} points at {rate} Hz", track.method, track.coefficients, track.points));
-    say("frame", if track.frame_id.is_empty() { "not named".into() } else { track.frame_id.clone() });
-    if let Some([latitude, longitude, altitude]) = track.origin {
-        say(
-            "zero of the coordinates",
-            format!("latitude {latitude:.7}°, longitude {longitude:.7}° (WGS 84), altitude {altitude:.2} m"),
-        );
-    }
+    let made = format!("{} ({}), {} points at {rate} Hz", track.method, track.coefficients, track.points);
+    said.push(tables::said("track", &made));
+    said.extend(tables::place(&track.frame_id, track.origin));
     if let Some(found) = &report.registration {
         let converged = if found.converged { "converged" } else { "not converged" };
-        say("registration", format!("{converged} in {} steps, {} knots", found.iterations, found.knots));
+        let how = format!("{converged} in {} steps, {} knots", found.iterations, found.knots);
+        said.push(tables::said("registration", &how));
     }
-    let table = Table {
-        caption: "The same input, config, version and platform give the same track".into(),
-        columns: vec![Column::words("what"), Column::words("value")],
-        rows,
-    };
-    vec![
-        Part::Table(table),
-        Part::Text("The config that makes this track again:".into()),
-        Part::Code(config.to_owned()),
-    ]
+    tables::again(said, config)
 }
