@@ -71,6 +71,7 @@ impl Config {
         )?;
         positive("usbl.speed_limit_m_s", Some(usbl.speed_limit_m_s))?;
         positive("usbl.cycle_s", usbl.cycle_s)?;
+        positive("usbl.bridge_max_s", Some(usbl.bridge_max_s))?;
         let latency_ok = usbl.latency_s.is_finite();
         range(latency_ok, "usbl.latency_s".into(), usbl.latency_s.to_string(), "a finite number")?;
         let priors = &self.registration;

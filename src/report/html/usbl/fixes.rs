@@ -25,7 +25,7 @@ const REASONS: [(Reason, &str, &str); 3] = [
 
 /// The fixes with their verdicts that hold `wanted`, in order of time.
 fn of(parts: Parts<'_>, wanted: impl Fn(&Judged) -> bool) -> Vec<(&Sample, &Judged)> {
-    let all = parts.fixes.iter().zip(&parts.dive.cleaned.judged);
+    let all = parts.fixes.iter().zip(&parts.dive.judged);
     let mut found: Vec<_> = all.filter(|(_, judged)| wanted(judged)).collect();
     found.sort_by(|a, b| a.0.time_s.total_cmp(&b.0.time_s));
     found
