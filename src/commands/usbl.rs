@@ -11,7 +11,7 @@ use crate::math::geodesy::{Geodetic, LocalFrame};
 use crate::publish::{Context, Stream, Topic, fix_messages, messages, track_messages, usbl_fix_messages};
 use crate::report::{UsblParts, UsblReport, html, render_usbl};
 use crate::resolve;
-use crate::source::{self, DiveSamples};
+use crate::source::{self, DiveSamples, SigmaOrigin};
 use crate::time::Time;
 
 /// Cleans a USBL system's fixes and writes the track, a prediction and every fix's verdict beside them.
@@ -58,6 +58,9 @@ pub fn usbl(args: &Addition) -> Result<Outcome, CommandError> {
     config.output.t0_ns = Some(t0.ns());
     let shift_s = resolve::log_time_shift_s(&loaded);
     warnings.extend(resolve::warnings_of(std::slice::from_ref(&loaded), shift_s));
+    if plan.sigma_is_guess {
+        loaded.sigma[0] = Some((dive.noise_m[0], SigmaOrigin::Estimated));
+    }
     let told = dive.pieces.iter().flat_map(|piece| &piece.warnings).chain(&dive.warnings);
     let told = told.filter(|w| !plan.sigma_is_guess || !matches!(w, Warning::Noise { .. }));
     warnings.extend(told.map(|w| w.clone().later(origin.seconds_since(t0)).to_string()));
@@ -92,7 +95,7 @@ pub fn usbl(args: &Addition) -> Result<Outcome, CommandError> {
         geodetic,
     };
     let metadata = addition::metadata(&log, &config, "usbl", &report)?;
-    let parts = html::usbl::Parts { report: &report, dive: &dive, fixes: &fixes.positions, origin, t0 };
+    let parts = html::usbl::Parts { report: &report, dive: &dive, origin, t0 };
     let page = html_report::prepare(args, &metadata, |provenance, config| {
         html::usbl::page(parts, provenance, config)
     })?;

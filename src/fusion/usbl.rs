@@ -61,6 +61,10 @@ pub struct Dive {
     pub prediction: Track,
     /// The smoother's result, piece by piece.
     pub pieces: Vec<Cleaned>,
+    /// Standard deviation of the kept fixes' noise over that in `fixes`: horizontal, vertical.
+    pub noise_scale: [f64; 2],
+    /// Median standard deviation of the kept fixes' noise, m: horizontal, vertical.
+    pub noise_m: [f64; 2],
     /// Time from one exchange to the next, s.
     pub cycle_s: f64,
     /// Root mean square 3-D distance of the prediction from the track: while fixes come, and in silence, m.
@@ -106,22 +110,27 @@ pub fn clean(
     heights: &[Height],
     plan: &DivePlan,
 ) -> Result<Dive, EstimateError> {
-    let positions = &fixes.positions;
+    let mut positions = fixes.positions.clone();
+    if let (true, Some(sigma_m)) = (plan.sigma_is_guess, usbl::cycles::guessed_sigma_m(&positions)) {
+        positions.iter_mut().for_each(|fix| fix.sigma = [sigma_m; 3]);
+    }
     let stray = Judged { verdict: Verdict::Wild, reason: Reason::Stray, ..Judged::UNJUDGED };
     let mut found = Dive {
         fusion: Fusion::default(),
-        fixes: positions.clone(),
+        fixes: Vec::new(),
         judged: vec![stray; positions.len()],
         kept: Source { name: fixes.name.clone(), ..Source::default() },
         prediction: Track { frame_id: plan.frame_id.clone(), points: Vec::new() },
         pieces: Vec::new(),
+        noise_scale: [1.0; 2],
+        noise_m: [f64::NAN; 2],
         cycle_s: 0.0,
         prediction_rmse_m: [None; 2],
         warnings: Vec::new(),
     };
     let (mut ranges, mut kept, mut failed): (Vec<Range<usize>>, Vec<Source>, _) =
         (Vec::new(), Vec::new(), None);
-    for range in parted(positions, plan.bridge_max_s) {
+    for range in parted(&positions, plan.bridge_max_s) {
         let own = &positions[range.clone()];
         let heights = about(heights, own);
         let cleaned = match usbl::clean(own, &heights, &plan.settings) {
@@ -150,23 +159,31 @@ pub fn clean(
     if strays > 0 {
         found.warnings.push(Warning::Stray { count: strays, of: positions.len() });
     }
-    if plan.sigma_is_guess {
+    if !plan.sigma_is_guess {
+        found.noise_scale = found.longest().noise_scale;
+    } else {
         for (range, piece) in ranges.iter().zip(&found.pieces) {
             let [across, down] = piece.noise_scale;
-            for fix in &mut found.fixes[range.clone()] {
+            for fix in &mut positions[range.clone()] {
                 fix.sigma = [across * fix.sigma[0], across * fix.sigma[1], down * fix.sigma[2]];
             }
         }
     }
+    found.noise_m = [0, 2].map(|axis| {
+        let kept = positions.iter().zip(&found.judged).filter(|(_, judged)| judged.verdict == Verdict::Kept);
+        let mut sigmas: Vec<f64> = kept.map(|(fix, _)| fix.sigma[axis]).collect();
+        found.noise_scale[axis / 2] * robust::median(&mut sigmas).unwrap_or(f64::NAN)
+    });
     let steps = found.pieces.iter().flat_map(|piece| piece.cycle_times_s.windows(2).map(|w| w[1] - w[0]));
     let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
     found.cycle_s = plan.cycle_s.or_else(|| robust::median(&mut steps)).unwrap_or(20.0);
     found.kept.positions = kept.iter().flat_map(|piece| &piece.positions).copied().collect();
     track(&mut found, &kept, plan);
 
-    let by_arrival = Arrived::of(positions, arrival, &ranges);
+    let by_arrival = Arrived::of(&positions, arrival, &ranges);
     by_arrival.late.iter().for_each(|&i| found.judged[i].late = true);
     found.warnings.extend(by_arrival.warning(positions.len()));
+    found.fixes = positions;
     for range in &ranges {
         let points = predict(&found, range.clone(), plan);
         found.prediction.points.extend(points);
