@@ -13,6 +13,7 @@ use crate::fusion::{self, Fusion, Plan};
 use crate::log::Log;
 use crate::math::robust;
 use crate::sample::Source;
+pub(crate) use crate::source::DIFFERENT_EPOCHS_S;
 use crate::source::Loaded;
 use crate::time::Time;
 
@@ -222,9 +223,6 @@ pub fn first_sample(datum: &Source, fusion: &Fusion, origin: Time) -> Time {
     let start = fusion.pieces.first().map_or(0.0, |p| p.0);
     origin.plus_seconds(if first.is_finite() { first } else { start })
 }
-
-/// Clocks that differ by more than this count from different epochs.
-pub(crate) const DIFFERENT_EPOCHS_S: f64 = 3600.0;
 
 /// Seconds between the datum's clock and the log's, where they are clocks of different epochs.
 #[must_use]

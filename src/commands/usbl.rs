@@ -30,11 +30,14 @@ pub fn usbl(args: &Addition) -> Result<Outcome, CommandError> {
     Appender::check(&log, &destination, &all)?;
     html_report::check(args, &log, &destination)?;
 
-    let mut damaged = choose_fixes(&log, &mut config)?;
+    let (path, mut damaged) = choose_fixes(&log, &config)?;
     warnings.extend(passed_over(&damaged));
-    let path = config.usbl.fix.clone().unwrap_or_default();
+    config.usbl.fix = Some(path.clone());
     let input = source::load_dive(&log, &path, &config.usbl, config.output.origin)?;
-    let DiveSamples { fixes: mut loaded, heights, origin, warnings: said, read } = input;
+    let DiveSamples { fixes: mut loaded, heights, origin, warnings: said, read, .. } = input;
+    if input.above_ellipsoid {
+        config.output.surface_at_zero.get_or_insert(false);
+    }
     damaged.extend(read.damaged);
     addition::ensure_whole(&mut damaged, &log, args)?;
     warnings.extend(said.into_iter().filter(|sentence| !warnings.contains(sentence)).collect::<Vec<_>>());
@@ -75,7 +78,7 @@ pub fn usbl(args: &Addition) -> Result<Outcome, CommandError> {
         origin: config.output.origin,
         loaded: &loaded,
         fixes: &fixes,
-        depth: config.usbl.depth.as_deref().map(|path| (path, heights.len())),
+        depth: config.usbl.depth.as_deref().map(|path| (path, heights.len(), input.with_height)),
         plan: &plan,
         dive: &dive,
         notes: &notes,
@@ -117,12 +120,10 @@ pub fn usbl(args: &Addition) -> Result<Outcome, CommandError> {
     Ok(if warnings.is_empty() { Outcome::Done } else { Outcome::Warned })
 }
 
-/// Fills in the fixes' path where the config names none, and returns what could not be read on the way.
-fn choose_fixes(log: &Log, config: &mut Config) -> Result<Vec<LogError>, CommandError> {
-    if config.usbl.fix.is_some() {
-        return Ok(Vec::new());
+/// The fixes' path, and what could not be read on the way to it where the config names none.
+fn choose_fixes(log: &Log, config: &Config) -> Result<(String, Vec<LogError>), CommandError> {
+    match &config.usbl.fix {
+        Some(path) => Ok((path.clone(), Vec::new())),
+        None => Ok(source::usbl_fix(log)?),
     }
-    let (path, damaged) = source::usbl_fix(log)?;
-    config.usbl.fix = Some(path);
-    Ok(damaged)
 }

@@ -17,7 +17,8 @@ pub struct Usbl {
     pub fix: Option<String>,
     /// Directions of x, y and z of the fixes and of the ship; of no meaning for latitudes.
     pub axes: Axes,
-    /// What counts as a fix's time; default: its stamp, else the publish time, else the log time.
+    /// What counts as the time of a fix, and of the ship's positions, headings and depths; default: its stamp, else the
+    /// publish time, else the log time.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(example = &"log")]
     pub time: Option<TimeChoice>,
@@ -53,8 +54,8 @@ pub struct Usbl {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(example = 1.0)]
     pub ship_sigma_m: Option<f64>,
-    /// Message path of a number: the vehicle's depth below the surface, m, where z = 0 is the surface; default: the
-    /// depth is not used.
+    /// Message path of a number: the vehicle's depth below the surface, m, where z = 0 is the surface, so that an `origin`
+    /// lies on it; default: the depth is not used.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(example = &"/vehicle/depth.depth")]
     pub depth: Option<String>,

@@ -81,6 +81,8 @@ pub struct DepthReport {
     pub path: String,
     /// How many depths it gave.
     pub samples: usize,
+    /// How many fixes have depths about them that they could be held against.
+    pub fixes: usize,
 }
 
 /// The smoothed track.
@@ -132,8 +134,8 @@ pub struct UsblParts<'a> {
     pub loaded: &'a Loaded,
     /// The fixes.
     pub fixes: &'a Source,
-    /// The depth channel's path, and how many depths it gave.
-    pub depth: Option<(&'a str, usize)>,
+    /// The depth channel's path, how many depths it gave, and how many fixes have some about them.
+    pub depth: Option<(&'a str, usize, usize)>,
     /// What was to be done.
     pub plan: &'a DivePlan,
     /// What came of it.
@@ -180,7 +182,11 @@ impl UsblReport {
                 thrown_out: dive.exchanges().1,
                 cycle_s: dive.cycle_s,
             },
-            depth: parts.depth.map(|(path, samples)| DepthReport { path: path.into(), samples }),
+            depth: parts.depth.map(|(path, samples, fixes)| DepthReport {
+                path: path.into(),
+                samples,
+                fixes,
+            }),
             track: UsblTrackReport {
                 frame_id: track.frame_id.clone(),
                 origin: parts.origin,
@@ -287,8 +293,9 @@ fn fixes(out: &mut String, report: &UsblReport) -> fmt::Result {
         write!(out, "; {thrown_out} of them thrown out as a whole")?;
     }
     writeln!(out)?;
-    if let Some(DepthReport { path, samples }) = &report.depth {
+    if let Some(DepthReport { path, samples, fixes: beside }) = &report.depth {
         writeln!(out, "depth   {samples} of {}", printable(path))?;
+        writeln!(out, "        {beside} of {} fixes have a depth beside them", source.positions)?;
     }
     Ok(())
 }

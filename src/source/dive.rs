@@ -1,17 +1,18 @@
 //! What a USBL system saw of a dive, in one pass over the log: fixes in whatever shape, the ship, the depth.
 
-use super::SourceError;
+use super::dive_depth::{Beside, beside};
+use super::dive_error::DiveError;
+use super::dive_ship::{headings, place, widen};
 use super::gathered::{Gathered, Kind};
-use super::load::{Loaded, Readers, SigmaOrigin, lack};
-use super::numbers::Numbers;
-use crate::config::{AngleUnit, SourceConfig, Usbl};
-use crate::estimate::usbl::geometry::{self, Polar};
+use super::load::{DIFFERENT_EPOCHS_S, Loaded, Readers, lack};
+use super::numbers::{Numbers, Series};
+use super::{SourceError, Timing};
+use crate::config::{SourceConfig, Usbl};
+use crate::estimate::usbl::Height;
+use crate::estimate::usbl::geometry::bend_m;
 use crate::estimate::usbl::ship::ShipTrack;
-use crate::estimate::usbl::{Height, sigma_at_range};
-use crate::log::decode::{MessagePath, Step};
 use crate::log::{Log, MessagesRead, passed_over};
 use crate::math::robust;
-use crate::sample::Sample;
 use crate::time::Time;
 
 /// What the fixes are called.
@@ -24,6 +25,10 @@ pub struct DiveSamples {
     pub fixes: Loaded,
     /// The depth sensor's heights.
     pub heights: Vec<Height>,
+    /// How many fixes have a height beside them.
+    pub with_height: usize,
+    /// Whether heights count from the ellipsoid, and nothing tells where the sea's surface is.
+    pub above_ellipsoid: bool,
     /// What the samples' seconds count from: the fixes' median time.
     pub origin: Time,
     /// What a person must read.
@@ -32,12 +37,13 @@ pub struct DiveSamples {
     pub read: MessagesRead,
 }
 
-/// Loads the fixes at `path` and what else `usbl` names. Latitudes and longitudes become metres east, north and up of
-/// `origin` (degrees and m), by default the first fix or ship's position at altitude 0: z = 0 is then the surface.
+/// Loads the fixes at `path` and what else `usbl` names. Latitudes and longitudes become metres east and north of
+/// `origin` (degrees and m), by default the first fix or ship's position at altitude 0, and heights above the level
+/// surface through it.
 ///
 /// # Errors
-/// [`SourceError`] for a path or topic that doesn't fit, for one without a single sample, and for ranges and bearings
-/// without a ship.
+/// [`SourceError`] for a path or topic that doesn't fit, for one without a single sample, and for fixes and a ship or depth
+/// that don't fit together.
 pub fn load_dive(
     log: &Log,
     path: &str,
@@ -45,11 +51,10 @@ pub fn load_dive(
     origin: Option<[f64; 3]>,
 ) -> Result<DiveSamples, SourceError> {
     let index = log.index();
-    let common = SourceConfig { datum: true, axes: usbl.axes, ..SourceConfig::default() };
+    let common = SourceConfig { datum: true, axes: usbl.axes, time: usbl.time, ..SourceConfig::default() };
     let mut sources = vec![Gathered::new(&SourceConfig {
         name: NAME.into(),
         position: Some(path.into()),
-        time: usbl.time,
         latency_s: usbl.latency_s,
         position_sigma_m: usbl.sigma_m,
         ..common.clone()
@@ -57,19 +62,18 @@ pub fn load_dive(
     sources[0].kind = Kind::Acoustic(usbl.angles);
     if usbl.ship.is_some() {
         let (position, position_sigma_m) = (usbl.ship.clone(), usbl.ship_sigma_m);
-        sources.push(Gathered::new(&SourceConfig {
-            name: "ship".into(),
-            position,
-            position_sigma_m,
-            ..common
-        })?);
+        let config = SourceConfig { name: "ship".into(), position, position_sigma_m, ..common };
+        let mut ship = Gathered::new(&config)?;
+        ship.kind = Kind::Ship;
+        sources.push(ship);
     }
     let mut readers = Readers::default();
     for (i, source) in sources.iter().enumerate() {
         readers.add(index, i, source)?;
     }
-    let number =
-        |name, path: &Option<String>| path.as_deref().map(|path| Numbers::new(index, name, path)).transpose();
+    let number = |name, path: &Option<String>| {
+        path.as_deref().map(|path| Numbers::new(index, name, path, usbl.time)).transpose()
+    };
     let (mut heading, mut depth) = (number("heading", &usbl.heading)?, number("depth", &usbl.depth)?);
     let mut channels = readers.channels();
     channels.extend([&heading, &depth].into_iter().flatten().flat_map(Numbers::channels));
@@ -81,12 +85,18 @@ pub fn load_dive(
     for source in &mut sources {
         if let Some((_, error)) = lack(source, &read.damaged) {
             let has_ship = usbl.ship.is_some() && usbl.heading.is_some();
-            let is_unit = matches!(error, SourceError::NoUnit { .. });
-            return Err(if is_unit && !has_ship { SourceError::NoShip { path: path.into() } } else { error });
+            let is_unit = matches!(error, SourceError::Dive(DiveError::NoUnit { .. }));
+            return Err(if is_unit && !has_ship {
+                DiveError::NoShip { path: path.into() }.into()
+            } else {
+                error
+            });
         }
     }
 
     let is_polar = sources[0].one_kind();
+    // ranges are seen from the ship, whose height is theirs
+    let has_altitudes = sources.get(usize::from(is_polar)).is_some_and(Gathered::has_altitudes);
     let time = sources[0].median_time();
     let first = || {
         sources
@@ -100,20 +110,23 @@ pub fn load_dive(
         return Err(SourceError::Empty { name: NAME.into(), topic: path.into() });
     };
     let mut warnings = passed_over(&read.damaged);
-    let mut numbers = |numbers: Option<Numbers>| {
-        let (values, said) = numbers.map_or(Ok((Vec::new(), None)), |n| n.finish(time))?;
-        warnings.extend(said);
-        Ok::<_, SourceError>(values)
+    if let Some(ship) = &ship {
+        warnings.extend(ship.warnings.iter().cloned());
+        fixes.notes.extend(ship.notes.iter().cloned());
+        one_epoch("ship", ship.timing.delay_s, &fixes.timing)?;
+    }
+    let mut series = |name, numbers: Option<Numbers>| {
+        let series = numbers.map_or(Ok(Series::default()), |numbers| numbers.finish(time))?;
+        warnings.extend(series.warning);
+        if !series.values.is_empty() {
+            one_epoch(name, series.delay_s, &fixes.timing)?;
+        }
+        Ok::<_, SourceError>(series.values)
     };
-    let (headings, depths) = (numbers(heading)?, numbers(depth)?);
-    let unit = usbl.angles.or_else(|| unit_of(usbl.heading.as_deref()?));
-    let headings: Vec<(f64, f64)> = match (unit, usbl.heading.as_deref()) {
-        (None, Some(path)) if is_polar => {
-            return Err(SourceError::NoUnit { name: "heading".into(), path: path.into() });
-        }
-        (unit, _) => {
-            headings.iter().map(|&(t, angle)| (t, unit.map_or(angle, |u| u.radians(angle)))).collect()
-        }
+    let (turns, depths) = (series("heading", heading)?, series("depth", depth)?);
+    let headings = match &usbl.heading {
+        Some(path) if is_polar => headings(path, &turns, usbl.angles)?,
+        _ => Vec::new(),
     };
     let track = ship.as_ref().map(|ship| ShipTrack {
         positions: &ship.source.positions,
@@ -121,68 +134,59 @@ pub fn load_dive(
         heading_sigma_rad: usbl.heading_sigma_deg.to_radians(),
     });
     match track {
-        Some(track) if is_polar && !headings.is_empty() => warnings.extend(place(&mut fixes, &track, usbl)),
-        _ if is_polar => return Err(SourceError::NoShip { path: path.into() }),
+        Some(track) if is_polar && !headings.is_empty() => {
+            warnings.extend(place(&mut fixes, &track, usbl, time)?);
+        }
+        _ if is_polar => return Err(DiveError::NoShip { path: path.into() }.into()),
         Some(track) if usbl.sigma_of_range > 0.0 => {
-            warnings.extend(widen(&mut fixes, &track, usbl.sigma_of_range))
+            let places = [Some(&fixes), ship.as_ref()].map(|l| l.is_some_and(|l| l.fix_origin.is_some()));
+            if places[0] != places[1] {
+                return Err(DiveError::OtherFrame { fixes_are_places: places[0] }.into());
+            }
+            warnings.extend(widen(&mut fixes, &track, usbl.sigma_of_range, time)?);
         }
         _ => {}
     }
     if let Some(ship) = ship.filter(|_| is_polar) {
         (fixes.fix_origin, fixes.frame_id) = (ship.fix_origin, ship.frame_id);
     }
-    if fixes.source.positions.is_empty() {
-        return Err(SourceError::NoShip { path: path.into() });
-    }
     let height =
         |&(time_s, depth_m): &(f64, f64)| Height { time_s, z_m: -depth_m, sigma_m: usbl.depth_sigma_m };
-    let heights = depths.iter().map(height).collect();
-    Ok(DiveSamples { fixes, heights, origin: time, warnings, read })
-}
-
-/// The unit that the last field of a path says.
-fn unit_of(path: &str) -> Option<AngleUnit> {
-    match MessagePath::parse(path).ok()?.steps.last()? {
-        Step::Field(name) => AngleUnit::of_name(name),
-        _ => None,
+    let heights: Vec<Height> = depths.iter().map(height).collect();
+    let beside = if heights.is_empty() { Beside::default() } else { beside(&fixes, &heights, time)? };
+    if let (true, true, Some([latitude, longitude, altitude])) = (has_altitudes, beside.is_far, origin) {
+        let (offset_m, count) = (beside.offset_m, beside.count);
+        let surface = [latitude, longitude, altitude + offset_m];
+        return Err(DiveError::SurfaceElsewhere { offset_m, count, surface }.into());
     }
+    warnings.extend(beside.warning);
+    let above_ellipsoid = has_altitudes && heights.is_empty();
+    if above_ellipsoid {
+        fixes.notes.push(ABOVE_ELLIPSOID.into());
+    }
+    fixes.notes.extend(bend(&fixes));
+    let with_height = beside.count;
+    Ok(DiveSamples { fixes, heights, with_height, above_ellipsoid, origin: time, warnings, read })
 }
 
-/// Turns ranges, bearings and depressions into positions; those of instants at which the ship is not known are left out.
-fn place(fixes: &mut Loaded, ship: &ShipTrack<'_>, usbl: &Usbl) -> Option<String> {
-    let angle = usbl.angle_sigma_deg.to_radians();
-    let measured = |raw: &Sample| {
-        let [range_m, bearing_rad, depression_rad] = raw.value;
-        let seen = Polar { range_m, bearing_rad, depression_rad, sigma: [usbl.range_sigma_m, angle, angle] };
-        Some(geometry::fix(raw.time_s, &seen, &ship.at(raw.time_s)?))
-    };
-    let placed: Vec<Option<Sample>> = fixes.source.positions.iter().map(measured).collect();
-    let mut sigmas: Vec<f64> = placed.iter().flatten().flat_map(|fix| fix.sigma).collect();
-    let is_default = |usbl: &Usbl| (usbl.range_sigma_m, usbl.angle_sigma_deg, usbl.heading_sigma_deg);
-    let stated = is_default(usbl) != is_default(&Usbl::default());
-    let from = if stated { SigmaOrigin::Config } else { SigmaOrigin::Assumed };
-    fixes.sigma[0] = robust::median(&mut sigmas).map(|sigma| (sigma, from));
-    keep(fixes, &placed, "position and heading")
+/// What to know of heights that were altitudes.
+const ABOVE_ELLIPSOID: &str = "heights are altitudes, which may count from far off the sea's surface: `origin` in `[output]` with the                                surface's altitude puts z = 0 there, and `surface_at_zero = true` says so";
+
+/// An error where the clock of `name`, which log times are `delay_s` behind, is of another epoch than the fixes'.
+fn one_epoch(name: &'static str, delay_s: f64, of_fixes: &Timing) -> Result<(), DiveError> {
+    let apart_s = (delay_s - of_fixes.delay_s).abs();
+    if apart_s > DIFFERENT_EPOCHS_S { Err(DiveError::Epochs { name, apart_s }) } else { Ok(()) }
 }
 
-/// Adds the noise that grows with the range; fixes of instants at which the ship is not known are left out.
-fn widen(fixes: &mut Loaded, ship: &ShipTrack<'_>, share: f64) -> Option<String> {
-    let wider = |fix: &Sample| {
-        let (from, _) = ship.position_at(fix.time_s)?;
-        let range_m = (0..3).map(|i| (fix.value[i] - from[i]).powi(2)).sum::<f64>().sqrt();
-        Some(Sample { sigma: fix.sigma.map(|sigma| sigma_at_range(sigma, share, range_m)), ..*fix })
-    };
-    let wider: Vec<Option<Sample>> = fixes.source.positions.iter().map(wider).collect();
-    keep(fixes, &wider, "position")
-}
-
-/// Puts `found` in the fixes' place, and says how many there are of which the ship's `what` is not known.
-fn keep(fixes: &mut Loaded, found: &[Option<Sample>], what: &str) -> Option<String> {
-    let mut kept = found.iter().map(Option::is_some);
-    fixes.arrival.retain(|_| kept.next() == Some(true));
-    fixes.source.positions = found.iter().flatten().copied().collect();
-    let lost = found.len() - fixes.source.positions.len();
-    (lost > 0).then(|| {
-        format!("{NAME}: {lost} fixes are left out: the ship's {what} at their instants is not known")
+/// A sentence where the sea's level is no plane over the dive.
+fn bend(fixes: &Loaded) -> Option<String> {
+    let mut far_m: Vec<f64> = fixes.source.positions.iter().map(|p| p.value[0].hypot(p.value[1])).collect();
+    let far_m = robust::median(&mut far_m).filter(|_| fixes.fix_origin.is_some())?;
+    (bend_m(far_m) > 1.0).then(|| {
+        format!(
+            "the fixes lie {:.0} km from `origin` in `[output]`: z is the height above the level there, and altitudes in              `track_fix` are {:.0} m too high; an origin near the dive mends it",
+            far_m / 1000.0,
+            bend_m(far_m)
+        )
     })
 }

@@ -5,13 +5,23 @@ use super::reading::Fault;
 use crate::log::decode::Value;
 use crate::math::geodesy::Geodetic;
 
+/// What a place's height was given as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Level {
+    /// An altitude: the ellipsoid's zero may be a hundred metres off the sea's.
+    Altitude,
+    /// A depth below the sea's surface.
+    Depth,
+}
+
 /// The place that `value` holds; `None` where it is of another kind.
 ///
 /// # Errors
 /// [`Fault::NoFix`] where its status says that there is none, [`Fault::NotFinite`], [`Fault::OffEarth`].
-pub(super) fn fix(value: &Value) -> Option<Result<Geodetic, Fault>> {
+pub(super) fn fix(value: &Value) -> Option<Result<(Geodetic, Level), Fault>> {
     let field = |name| value.field(name);
-    let (altitude, sign) = field("altitude").map(|up| (up, 1.0)).or_else(|| Some((field("depth")?, -1.0)))?;
+    let up = field("altitude").map(|up| (up, Level::Altitude));
+    let (altitude, level) = up.or_else(|| Some((field("depth")?, Level::Depth)))?;
     let fields = [field("latitude")?, field("longitude")?, altitude];
     // `NavSatStatus`: below 0 the receiver has no fix, whatever it writes for one.
     let status = field("status").and_then(|status| status.field("status")).and_then(Value::as_i64);
@@ -19,13 +29,15 @@ pub(super) fn fix(value: &Value) -> Option<Result<Geodetic, Fault>> {
         return Some(Err(Fault::NoFix));
     }
     let mut numbers = fields.map(|field| field.as_f64().unwrap_or(f64::NAN));
-    numbers[2] *= sign;
+    if level == Level::Depth {
+        numbers[2] = -numbers[2];
+    }
     Some(if numbers.iter().any(|n| !n.is_finite()) {
         Err(Fault::NotFinite)
     } else if numbers[0].abs() > 90.0 || numbers[1].abs() > 360.0 {
         Err(Fault::OffEarth)
     } else {
-        Ok(Geodetic::from_degrees(numbers))
+        Ok((Geodetic::from_degrees(numbers), level))
     })
 }
 

@@ -2,11 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use super::SourceError;
+use super::fix::Level;
 use super::load::{Loaded, SigmaOrigin, Timing};
 use super::reading::{Clock, Fault, Measured, Outcome, Reading, sum};
+use super::{DiveError, SourceError};
 use crate::config::{AngleUnit, SourceConfig};
 use crate::estimate::noise;
+use crate::estimate::usbl::geometry::above_level;
 use crate::log::decode::{DecodeError, MessagePath};
 use crate::math::geodesy::{Geodetic, LocalFrame};
 use crate::math::robust;
@@ -42,6 +44,8 @@ pub(super) enum Kind {
     Track,
     /// Those of an acoustic system, which may come late, and may be ranges, bearings and depressions in this unit.
     Acoustic(Option<AngleUnit>),
+    /// Those of the ship that carries such a system.
+    Ship,
 }
 
 impl Gathered {
@@ -130,11 +134,12 @@ impl Gathered {
                 }
                 Some(Fault::NoUnit) => {
                     let path = path.to_string();
-                    return Some((Some(*quantity), SourceError::NoUnit { name, path }));
+                    return Some((Some(*quantity), DiveError::NoUnit { name, path }.into()));
                 }
                 Some(Fault::NoAngle) => {
                     let (path, count) = (path.to_string(), self.messages);
-                    return Some((Some(*quantity), SourceError::NotAngles { name, path, count }));
+                    let error = DiveError::NotAngles { name, path, beyond: count, count };
+                    return Some((Some(*quantity), error.into()));
                 }
                 Some(Fault::NoVector { kind, fits }) => (kind, fits),
                 Some(fault) => (fault.description().unwrap_or_default(), Vec::new()),
@@ -182,10 +187,16 @@ impl Gathered {
     /// The earliest latitude, longitude and altitude: degrees and m.
     pub(super) fn first_fix(&self) -> Option<[f64; 3]> {
         let fixes = self.readings.iter().flatten().filter_map(|reading| match reading.value {
-            Measured::Fix(place) => Some((reading.time, place)),
+            Measured::Fix(place, _) => Some((reading.time, place)),
             Measured::Vector(_) | Measured::Polar(_) => None,
         });
         fixes.min_by_key(|(time, _)| *time).map(|(_, place)| place.to_degrees())
+    }
+
+    /// Whether a height of it was given as an altitude.
+    pub(super) fn has_altitudes(&self) -> bool {
+        let is_altitude = |r: &Reading| matches!(r.value, Measured::Fix(_, Level::Altitude));
+        self.readings.iter().flatten().any(is_altitude)
     }
 
     /// Whether its positions are ranges, bearings and depressions; what is of the rarer kind is left out.
@@ -207,18 +218,26 @@ impl Gathered {
         let notes: Vec<String> = self.turn_offsets().into_iter().collect();
         let warnings = self.warnings();
         let fix_origin = fix_origin.filter(|_| self.first_fix().is_some());
-        let local = LocalFrame::new(Geodetic::from_degrees(fix_origin.unwrap_or_default()));
+        let zero = Geodetic::from_degrees(fix_origin.unwrap_or_default());
+        let local = LocalFrame::new(zero);
+        // a dive is seen against the sea's level, which the depth counts from
+        let place_of = |place: Geodetic, level: Level| match level {
+            _ if self.kind == Kind::Track => local.to_enu(place),
+            Level::Altitude => above_level(place, place.altitude_m - zero.altitude_m, &local, zero),
+            Level::Depth => above_level(place, place.altitude_m, &local, zero),
+        };
         let offset_m = self.config.offset_m;
         let mut source = Source { name: self.config.name.clone(), ..Source::default() };
         let mut sigma = [None, None];
         let positions = &self.readings[Quantity::Position as usize];
-        let arrival = if self.kind == Kind::Track { Vec::new() } else { arrival(positions) };
+        let is_acoustic = matches!(self.kind, Kind::Acoustic(_));
+        let arrival = if is_acoustic { arrival(positions) } else { Vec::new() };
         for quantity in Quantity::ALL {
             let readings = std::mem::take(&mut self.readings[quantity as usize]);
             let value = |reading: &Reading| {
                 let value = match reading.value {
                     Measured::Vector(value) | Measured::Polar(value) => value,
-                    Measured::Fix(place) => local.to_enu(place),
+                    Measured::Fix(place, level) => place_of(place, level),
                 };
                 let is_whole = quantity == Quantity::Velocity || reading.offset_is_turned;
                 if is_whole { value } else { sum(value, offset_m) }
@@ -311,7 +330,7 @@ impl Gathered {
                  `time` for this source"
             ));
         }
-        if self.farthest_back_s > BACKWARD_S && self.kind == Kind::Track {
+        if self.farthest_back_s > BACKWARD_S && !matches!(self.kind, Kind::Acoustic(_)) {
             warnings.push(format!(
                 "{name}: times go back by up to {:.1} s from one message to the next",
                 self.farthest_back_s

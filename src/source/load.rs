@@ -10,6 +10,9 @@ use crate::log::{Index, Log, LogError, Message, MessagesRead, passed_over};
 use crate::sample::{Quantity, Source};
 use crate::time::Time;
 
+/// Clocks that differ by more than this count from different epochs, s.
+pub(crate) const DIFFERENT_EPOCHS_S: f64 = 3600.0;
+
 /// Where a sigma comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SigmaOrigin {

@@ -6,6 +6,9 @@
 
 mod candidate;
 mod dive;
+mod dive_depth;
+mod dive_error;
+mod dive_ship;
 mod events;
 mod fix;
 mod gathered;
@@ -22,8 +25,10 @@ mod usbl;
 
 pub use candidate::{Candidate, Judged, Judgement, Unfit, judge};
 pub use dive::{DiveSamples, load_dive};
+pub use dive_error::{DiveError, Span};
 pub use events::{RecordedEvent, recorded_events};
 pub use glimpse::{Glimpse, glimpse};
+pub(crate) use load::DIFFERENT_EPOCHS_S;
 pub use load::{Loaded, Samples, SigmaOrigin, Timing, datum, load};
 pub use propose::{Proposal, propose, propose_chosen};
 pub use recognise::{Choice, Recognised, choices_of, recognise};
@@ -76,36 +81,9 @@ pub enum SourceError {
         /// Those, or all topics that hold a position.
         candidates: Vec<Candidate>,
     },
-    /// Angles of which nothing tells the unit.
-    #[error("source {name:?}: the angles at {} may be degrees or radians", printable(path))]
-    NoUnit {
-        /// The source.
-        name: String,
-        /// The path.
-        path: String,
-    },
-    /// Angles beyond those that there are.
-    #[error(
-        "source {name:?}: bearings at {} are beyond a turn, or depressions beyond the vertical, in all {count} messages",
-        printable(path)
-    )]
-    NotAngles {
-        /// The source.
-        name: String,
-        /// The path.
-        path: String,
-        /// Number of messages.
-        count: usize,
-    },
-    /// Ranges and bearings, and nothing to count them from.
-    #[error(
-        "the fixes at {} are ranges, bearings and depressions, expected the ship's position and heading beside them",
-        printable(path)
-    )]
-    NoShip {
-        /// The fixes' path.
-        path: String,
-    },
+    /// What was measured of a dive doesn't fit together.
+    #[error(transparent)]
+    Dive(#[from] DiveError),
     /// A path leads to something that is no number.
     #[error("source {name:?}: {} is no finite number in any of {count} messages", printable(path))]
     NoNumber {
@@ -298,13 +276,7 @@ impl SourceError {
                 let path = toml_string(&path.unwrap_or_else(|| "/topic.field".into()));
                 format!("`[usbl]` with `fix = {path}` in a config names the fixes: `--config`")
             }
-            Self::NoUnit { .. } => "`angles = \"deg\"` or `angles = \"rad\"` in `[usbl]` says which".into(),
-            Self::NotAngles { .. } => "if they are degrees, `angles = \"deg\"` in `[usbl]` says so".into(),
-            Self::NoShip { .. } => {
-                "`ship = \"/ship/navigation.position\"` and `heading = \"/ship/navigation.heading\"` in `[usbl]` name them, by \
-                 the message paths of your log, and `angles = \"deg\"` or `\"rad\"` the unit of the angles"
-                    .into()
-            }
+            Self::Dive(error) => error.hint(),
             Self::NoOrientation { .. } => {
                 "`velocity_frame = \"world\"` in this source says that nothing need be turned".into()
             }
@@ -319,7 +291,9 @@ impl SourceError {
                 format!("name the {what} by its message path: `{}.field`", printable(topic))
             }
             Self::NoTime { .. } | Self::OneInstant { .. } => {
-                "`time = \"publish\"` or `time = \"log\"` in this source takes another clock; for a reference, `--reference-time`".into()
+                "`time = \"publish\"` or `time = \"log\"` in this source, of `trackfuse usbl` in `[usbl]`, takes another clock; for a \
+                 reference, `--reference-time`"
+                    .into()
             }
             _ => return None,
         };

@@ -4,8 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::SourceError;
 use super::reading::Timed;
+use crate::config::TimeChoice;
 use crate::log::decode::{Decoder, MessagePath};
 use crate::log::{Index, Message};
+use crate::math::robust;
 use crate::time::Time;
 
 /// The numbers at one message path.
@@ -15,16 +17,33 @@ pub(super) struct Numbers {
     path: MessagePath,
     readers: BTreeMap<u16, (Decoder, Timed)>,
     values: Vec<(Time, f64)>,
+    delays_s: Vec<f64>,
     count: usize,
 }
 
+/// Numbers over time.
+#[derive(Debug, Default)]
+pub(super) struct Series {
+    /// Times, s, in order, and the finite numbers.
+    pub(super) values: Vec<(f64, f64)>,
+    /// Median of log time less the number's time, s.
+    pub(super) delay_s: f64,
+    /// A sentence on what was left out.
+    pub(super) warning: Option<String>,
+}
+
 impl Numbers {
-    /// Nothing yet; `name` is for the errors.
+    /// Nothing yet, to be timed as `time` says; `name` is for the errors.
     ///
     /// # Errors
     /// [`SourceError::Path`], [`SourceError::NoTopic`], [`SourceError::Decode`] and [`SourceError::Miss`] for a path that
     /// doesn't fit.
-    pub(super) fn new(index: &Index, name: &'static str, path: &str) -> Result<Self, SourceError> {
+    pub(super) fn new(
+        index: &Index,
+        name: &'static str,
+        path: &str,
+        time: Option<TimeChoice>,
+    ) -> Result<Self, SourceError> {
         let path =
             MessagePath::parse(path).map_err(|error| SourceError::Path { name: name.into(), error })?;
         let mut readers = BTreeMap::new();
@@ -36,7 +55,7 @@ impl Numbers {
                 Decoder::new(&channel.message_encoding, encoding, schema_name, data).map_err(|error| {
                     SourceError::Decode { name: name.into(), topic: path.topic.clone(), error }
                 })?;
-            let timing = Timed::new(&whole, &path.topic, None);
+            let timing = Timed::new(&whole, &path.topic, time);
             let mut wanted = timing.stamps.clone();
             wanted.push(path.clone());
             let decoder =
@@ -48,7 +67,7 @@ impl Numbers {
             let (topic, topics) = (path.topic, topics.into_iter().collect());
             return Err(SourceError::NoTopic { name: name.into(), topic, topics });
         }
-        Ok(Self { name, path, readers, values: Vec::new(), count: 0 })
+        Ok(Self { name, path, readers, values: Vec::new(), delays_s: Vec::new(), count: 0 })
     }
 
     /// The channels that are read.
@@ -65,24 +84,30 @@ impl Numbers {
             let number = self.path.resolve(&value).ok()??.as_f64().filter(|n| n.is_finite())?;
             Some((timing.of(&value, message)?.1, number))
         };
-        self.values.extend(value());
+        if let Some((time, number)) = value() {
+            let log_time = Time::from_log(message.log_time);
+            self.delays_s.extend(log_time.map(|log| log.seconds_since(time)));
+            self.values.push((time, number));
+        }
     }
 
-    /// The finite numbers in order of time, s since `origin`, and a sentence on what was left out.
+    /// The finite numbers, their times counted from `origin`.
     ///
     /// # Errors
     /// [`SourceError::NoNumber`] where there is none.
-    pub(super) fn finish(mut self, origin: Time) -> Result<(Vec<(f64, f64)>, Option<String>), SourceError> {
+    pub(super) fn finish(mut self, origin: Time) -> Result<Series, SourceError> {
         if self.values.is_empty() {
             let (name, path) = (self.name.into(), self.path.to_string());
             return Err(SourceError::NoNumber { name, path, count: self.count });
         }
         let left_out = self.count - self.values.len();
-        let said = (left_out > 0).then(|| {
+        let warning = (left_out > 0).then(|| {
             let name = self.name;
             format!("{name}: {left_out} messages are left out: no finite number at the path, or no time")
         });
         self.values.sort_by_key(|(time, _)| *time);
-        Ok((self.values.iter().map(|&(time, v)| (time.seconds_since(origin), v)).collect(), said))
+        let values = self.values.iter().map(|&(time, v)| (time.seconds_since(origin), v)).collect();
+        let delay_s = robust::median(&mut self.delays_s).unwrap_or(0.0);
+        Ok(Series { values, delay_s, warning })
     }
 }

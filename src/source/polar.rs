@@ -5,7 +5,7 @@ use crate::config::AngleUnit;
 use crate::log::decode::Value;
 
 /// Names of the fields, without their units; an elevation is a depression upwards.
-const RANGE: [&str; 3] = ["range", "slant_range", "range_m"];
+const RANGE: [&str; 4] = ["range", "slant_range", "range_m", "slant_range_m"];
 const BEARING: [&str; 2] = ["bearing", "azimuth"];
 const DEPRESSION: [&str; 1] = ["depression"];
 const ELEVATION: [&str; 1] = ["elevation"];
@@ -77,7 +77,7 @@ mod tests {
         let plain = [("range", 100.0), ("bearing", 90.0), ("depression", 45.0)];
         let expected = Some(Ok([100.0, FRAC_PI_2, FRAC_PI_2 / 2.0]));
         assert_eq!(read(&plain, Some(AngleUnit::Degrees)), expected);
-        let named = [("slant_range", 100.0), ("azimuth_deg", 90.0), ("elevation_rad", -FRAC_PI_2 / 2.0)];
+        let named = [("slant_range_m", 100.0), ("azimuth_deg", 90.0), ("elevation_rad", -FRAC_PI_2 / 2.0)];
         assert_eq!(read(&named, None), expected);
         assert!(read(&plain, None).is_some_and(|found| found.is_err()), "nothing tells the unit");
     }

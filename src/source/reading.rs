@@ -1,7 +1,7 @@
 //! One channel's messages as readings: which fields hold the time, the vectors and their covariances.
 
 use super::SourceError;
-use super::fix::{covariance_is_unknown, fix};
+use super::fix::{Level, covariance_is_unknown, fix};
 use super::gathered::Kind;
 use super::polar::polar;
 use crate::config::{Axes, SourceConfig, TimeChoice, VelocityFrame};
@@ -45,8 +45,8 @@ pub(super) struct Reading {
 pub(super) enum Measured {
     /// Metres or m/s along the track's axes.
     Vector([f64; 3]),
-    /// A place on the earth.
-    Fix(Geodetic),
+    /// A place on the earth, and what its height was given as.
+    Fix(Geodetic, Level),
     /// Range, m, bearing and depression, rad, from a ship.
     Polar([f64; 3]),
 }
@@ -249,9 +249,12 @@ impl Reader {
             .map(|variances| variances.map(f64::sqrt));
         if let (Quantity::Position, Some(place)) = (vector.quantity, fix(at)) {
             let sigma = sigma.filter(|_| !covariance_is_unknown(at));
-            return Ok(Reading { time, value: Measured::Fix(place?), sigma, offset_is_turned: false });
+            let (place, level) = place?;
+            return Ok(Reading { time, value: Measured::Fix(place, level), sigma, offset_is_turned: false });
         }
+        // the position that a system works out itself comes before what it measured
         if let Kind::Acoustic(unit) = self.kind
+            && at.as_vector3().is_none()
             && let Some(measured) = polar(at, unit)
         {
             let value = Measured::Polar(measured?);

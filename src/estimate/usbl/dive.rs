@@ -50,12 +50,11 @@ impl Dive {
 
 /// What the depth sensor says at an instant: height and its sigma, between two samples that are close.
 pub(super) fn height_at(sorted: &[Height], time_s: f64) -> Option<(f64, f64)> {
-    /// The vehicle sinks evenly for so long.
-    const CLOSE_S: f64 = 10.0;
     let after = sorted.partition_point(|h| h.time_s < time_s);
     let next = sorted.get(after)?;
     let last = if next.time_s <= time_s { next } else { sorted.get(after.checked_sub(1)?)? };
     let gap_s = next.time_s - last.time_s;
     let share = if gap_s > 0.0 { (time_s - last.time_s) / gap_s } else { 0.0 };
-    (gap_s <= CLOSE_S).then(|| (last.z_m + share * (next.z_m - last.z_m), last.sigma_m.max(next.sigma_m)))
+    (gap_s <= super::CLOSE_S)
+        .then(|| (last.z_m + share * (next.z_m - last.z_m), last.sigma_m.max(next.sigma_m)))
 }

@@ -74,20 +74,19 @@ pub fn fix(time_s: f64, seen: &Polar, ship: &Ship) -> Sample {
     Sample { time_s, value, sigma: std::array::from_fn(|a| covariance[a][a].sqrt()) }
 }
 
-/// The fix of a latitude and longitude, degrees, and a depth below the sea's surface, m, in a frame whose origin lies on
-/// that surface.
+/// Where `place` lies, m: east and north of the frame's `zero`, and `height_m` above the level surface through it, whatever
+/// the place's own altitude. That surface, from which a depth counts, bends away from the frame's plane: by 31 m at 20 km.
 #[must_use]
-pub fn fix_from_depth(
-    time_s: f64,
-    [latitude_deg, longitude_deg]: [f64; 2],
-    depth_m: f64,
-    frame: &LocalFrame,
-    sigma: [f64; 3],
-) -> Sample {
-    let place = |altitude_m| Geodetic::from_degrees([latitude_deg, longitude_deg, altitude_m]);
-    let [east, north, _] = frame.to_enu(place(-depth_m));
-    // depth counts from the sea's surface, which bends away from the frame's plane
-    Sample { time_s, value: [east, north, -depth_m], sigma }
+pub fn above_level(place: Geodetic, height_m: f64, frame: &LocalFrame, zero: Geodetic) -> [f64; 3] {
+    let [east, north, _] = frame.to_enu(Geodetic { altitude_m: zero.altitude_m + height_m, ..place });
+    [east, north, height_m]
+}
+
+/// How far the level surface lies below the frame's plane so far from its origin, m.
+#[must_use]
+pub fn bend_m(distance_m: f64) -> f64 {
+    const EARTH_RADIUS_M: f64 = 6_371_000.0;
+    distance_m * distance_m / (2.0 * EARTH_RADIUS_M)
 }
 
 #[cfg(test)]
@@ -160,9 +159,13 @@ mod tests {
     }
 
     #[test]
-    fn a_depth_is_a_height_below_the_frames_origin() {
-        let frame = LocalFrame::new(Geodetic::from_degrees([10.0, 140.0, 0.0]));
-        let fix = fix_from_depth(3.0, [10.01, 140.0], 4000.0, &frame, [3.0; 3]);
-        assert!((fix.value[2] + 4000.0).abs() < 1e-9 && (fix.value[1] - 1105.3).abs() < 1.0, "{fix:?}");
+    fn a_depth_counts_from_the_level_through_the_frames_origin() {
+        let zero = Geodetic::from_degrees([10.0, 140.0, 45.0]);
+        let place = Geodetic::from_degrees([10.18, 140.0, -4000.0]);
+        let frame = LocalFrame::new(zero);
+        let found = above_level(place, -4000.0, &frame, zero);
+        assert!(found[2] == -4000.0 && (found[1] - 19_896.0).abs() < 10.0, "{found:?}");
+        let up = frame.to_enu(Geodetic { altitude_m: -3955.0, ..place })[2];
+        assert!((found[2] - up - bend_m(found[1])).abs() < 0.5, "the plane is not level: {up}");
     }
 }

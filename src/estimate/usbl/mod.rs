@@ -90,6 +90,16 @@ pub struct Height {
     pub sigma_m: f64,
 }
 
+/// Between heights farther apart than this nothing is known of the height, s: the vehicle sinks evenly for so long.
+pub const CLOSE_S: f64 = 10.0;
+
+/// Height at an instant and its standard deviation, m, of `heights` in order of time; `None` where no two close ones
+/// lie about it.
+#[must_use]
+pub fn height_at(heights: &[Height], time_s: f64) -> Option<(f64, f64)> {
+    dive::height_at(heights, time_s)
+}
+
 /// A fix whose noise is that of a system with this standard deviation an axis close by and this share of the slant
 /// range far away: `sqrt(near^2 + (share * range)^2)`, m.
 #[must_use]

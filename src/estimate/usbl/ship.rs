@@ -6,7 +6,7 @@ use super::geometry::Ship;
 use crate::sample::Sample;
 
 /// Between samples farther apart than this the ship counts as unseen, s.
-const MOST_GAP_S: f64 = 10.0;
+pub const MOST_GAP_S: f64 = 10.0;
 
 /// Before the first, after the last and beside a gap, a sample holds for so long, s.
 const HOLDS_S: f64 = 2.0;

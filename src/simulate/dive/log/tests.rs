@@ -8,7 +8,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
-use crate::estimate::usbl::geometry::{Polar, Ship, fix_from_depth, position};
+use crate::estimate::usbl::geometry::{Polar, Ship, above_level, position};
 use crate::simulate::ScenarioFile;
 use crate::simulate::dive::scenario::{MessagesScenario, ShipScenario};
 use crate::simulate::dive::ship::seen_from;
@@ -184,19 +184,23 @@ fn noise_past_straight_down_is_seen_on_the_other_side() {
 #[test]
 fn latitudes_longitudes_and_depths_lead_back_to_the_truth() {
     let (bytes, dive) = log_of(&scenario(GEODETIC));
-    let frame = LocalFrame::new(Geodetic::from_degrees([-33.9, 18.4, 0.0]));
+    let zero = Geodetic::from_degrees([-33.9, 18.4, 0.0]);
+    let frame = LocalFrame::new(zero);
+    let fix = |[latitude, longitude]: [f64; 2], depth_m: f64| {
+        above_level(Geodetic::from_degrees([latitude, longitude, -depth_m]), -depth_m, &frame, zero)
+    };
     let topics = read(&bytes);
     for message in &topics["/usbl/fix"] {
         let place = ["latitude", "longitude"].map(|key| message.number(key));
-        let fix = fix_from_depth(message.stamp_s, place, message.number("depth"), &frame, [1.0; 3]);
-        let off = Vector3::from(fix.value) - dive.trajectory.at(message.stamp_s).position;
+        let off =
+            Vector3::from(fix(place, message.number("depth"))) - dive.trajectory.at(message.stamp_s).position;
         assert!(off.norm() < 2e-3, "{off}");
     }
     // where the sea's surface is 200 m below the frame's plane
     let far = place_json(&frame, &Vector3::new(4e4, -3e4, -900.0), "depth", 900.0);
     let place = ["latitude", "longitude"].map(|key| far[key].as_f64().unwrap());
-    let fix = fix_from_depth(0.0, place, 900.0, &frame, [1.0; 3]);
-    assert!((fix.value[0] - 4e4).hypot(fix.value[1] + 3e4) < 2e-3, "{fix:?}");
+    let [east, north, _] = fix(place, 900.0);
+    assert!((east - 4e4).hypot(north + 3e4) < 2e-3, "{east} {north}");
     let ship = &topics["/ship/navigation"][0];
     assert!((ship.number("latitude") + 33.9 - 200.0 / 110_900.0).abs() < 5e-5, "{}", ship.said);
     assert!(ship.number("altitude").abs() < 10.0 && ship.said.get("position").is_none());

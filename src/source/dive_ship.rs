@@ -1,0 +1,158 @@
+//! What the ship's track adds to fixes: places for ranges and bearings, and noise that grows with the range.
+
+use super::dive_error::{DiveError, Span};
+use super::load::{Loaded, SigmaOrigin};
+use crate::config::{AngleUnit, Usbl};
+use crate::estimate::usbl::geometry::{self, Polar};
+use crate::estimate::usbl::ship::{MOST_GAP_S, ShipTrack};
+use crate::estimate::usbl::sigma_at_range;
+use crate::log::decode::{MessagePath, Step};
+use crate::math::robust;
+use crate::sample::Sample;
+use crate::time::Time;
+
+/// Headings by time in radians; `angles` is the unit where the field's name doesn't say one.
+///
+/// # Errors
+/// [`DiveError::NoUnit`]; [`DiveError::NotAngles`] where one of them is more than a turn.
+pub(super) fn headings(
+    path: &str,
+    values: &[(f64, f64)],
+    angles: Option<AngleUnit>,
+) -> Result<Vec<(f64, f64)>, DiveError> {
+    /// A turn that was not wrapped at once, rad.
+    const MOST_RAD: f64 = 6.5;
+    let of_name = || match MessagePath::parse(path).ok()?.steps.last()? {
+        Step::Field(name) => AngleUnit::of_name(name),
+        _ => None,
+    };
+    let (name, path) = ("heading".to_owned(), path.to_owned());
+    let Some(unit) = of_name().or(angles) else {
+        return Err(DiveError::NoUnit { name, path });
+    };
+    let turned: Vec<(f64, f64)> = values.iter().map(|&(t, angle)| (t, unit.radians(angle))).collect();
+    match turned.iter().filter(|(_, angle)| angle.abs() > MOST_RAD).count() {
+        0 => Ok(turned),
+        beyond => Err(DiveError::NotAngles { name, path, beyond, count: turned.len() }),
+    }
+}
+
+/// Turns ranges, bearings and depressions into positions; those of instants at which the ship is not known are left out,
+/// with a sentence. Times count from `origin`.
+///
+/// # Errors
+/// [`DiveError::ShipElsewhere`] where none is left.
+pub(super) fn place(
+    fixes: &mut Loaded,
+    ship: &ShipTrack<'_>,
+    usbl: &Usbl,
+    origin: Time,
+) -> Result<Option<String>, DiveError> {
+    let angle = usbl.angle_sigma_deg.to_radians();
+    let measured = |raw: &Sample| {
+        let [range_m, bearing_rad, depression_rad] = raw.value;
+        let seen = Polar { range_m, bearing_rad, depression_rad, sigma: [usbl.range_sigma_m, angle, angle] };
+        Some(geometry::fix(raw.time_s, &seen, &ship.at(raw.time_s)?))
+    };
+    let placed: Vec<Option<Sample>> = fixes.source.positions.iter().map(measured).collect();
+    let (count, known) = (placed.len(), placed.iter().flatten().count());
+    let times = (Span::of(origin, ship.positions.iter().map(|p| p.time_s)), headings_span(ship, origin));
+    if known == 0 {
+        let fixes = span(fixes, origin);
+        let ship = vec![("positions", times.0), ("headings", times.1)];
+        let (what, most_gap_s) = ("position and heading", MOST_GAP_S);
+        return Err(DiveError::ShipElsewhere { what, fixes, ship, most_gap_s });
+    }
+    let mut kept = placed.iter().map(Option::is_some);
+    fixes.arrival.retain(|_| kept.next() == Some(true));
+    fixes.source.positions = placed.iter().flatten().copied().collect();
+    let is_default = |usbl: &Usbl| (usbl.range_sigma_m, usbl.angle_sigma_deg, usbl.heading_sigma_deg);
+    let stated = is_default(usbl) != is_default(&Usbl::default());
+    let from = if stated { SigmaOrigin::Config } else { SigmaOrigin::Assumed };
+    fixes.sigma[0] = median_sigma(fixes).map(|sigma| (sigma, from));
+    let lost = count - known;
+    Ok((lost > 0).then(|| {
+        format!(
+            "usbl: {lost} of {count} fixes are left out: the ship's position and heading about them are not known, or more \
+             than {MOST_GAP_S:.0} s apart (positions {}; headings {})",
+            times.0, times.1
+        )
+    }))
+}
+
+/// Adds the noise that grows with the range, which is taken for the usual one where the ship is not known; a sentence
+/// where it is not.
+///
+/// # Errors
+/// [`DiveError::ShipElsewhere`] where it is known at no fix.
+pub(super) fn widen(
+    fixes: &mut Loaded,
+    ship: &ShipTrack<'_>,
+    share: f64,
+    origin: Time,
+) -> Result<Option<String>, DiveError> {
+    if !fixes.sigma[0].is_some_and(|(_, from)| from.is_stated()) {
+        return Ok(Some(
+            "usbl: `sigma_of_range` is not used: it adds to the noise nearby, which `sigma_m` in `[usbl]` states".into(),
+        ));
+    }
+    let range_m = |fix: &Sample| {
+        let (from, _) = ship.position_at(fix.time_s)?;
+        Some((0..3).map(|i| (fix.value[i] - from[i]).powi(2)).sum::<f64>().sqrt())
+    };
+    let ranges_m: Vec<Option<f64>> = fixes.source.positions.iter().map(range_m).collect();
+    let mut known: Vec<f64> = ranges_m.iter().flatten().copied().collect();
+    let (count, lost) = (ranges_m.len(), ranges_m.len() - known.len());
+    let positions = Span::of(origin, ship.positions.iter().map(|p| p.time_s));
+    let Some(usual_m) = robust::median(&mut known) else {
+        let (fixes, ship) = (span(fixes, origin), vec![("ship's positions", positions)]);
+        return Err(DiveError::ShipElsewhere { what: "position", fixes, ship, most_gap_s: MOST_GAP_S });
+    };
+    for (fix, range_m) in fixes.source.positions.iter_mut().zip(ranges_m) {
+        fix.sigma = fix.sigma.map(|sigma| sigma_at_range(sigma, share, range_m.unwrap_or(usual_m)));
+    }
+    if let (Some(sigma), Some((_, from))) = (median_sigma(fixes), fixes.sigma[0]) {
+        fixes.sigma[0] = Some((sigma, from));
+    }
+    Ok((lost > 0).then(|| {
+        format!(
+            "usbl: the noise of {lost} of {count} fixes is that of the usual range, {usual_m:.0} m: the ship's positions about \
+             them are not known, or more than {MOST_GAP_S:.0} s apart ({positions})"
+        )
+    }))
+}
+
+/// When there are fixes.
+pub(super) fn span(fixes: &Loaded, origin: Time) -> Span {
+    Span::of(origin, fixes.source.positions.iter().map(|fix| fix.time_s))
+}
+
+fn headings_span(ship: &ShipTrack<'_>, origin: Time) -> Span {
+    Span::of(origin, ship.headings.iter().map(|(time_s, _)| *time_s))
+}
+
+fn median_sigma(fixes: &Loaded) -> Option<f64> {
+    let mut sigmas: Vec<f64> = fixes.source.positions.iter().flat_map(|fix| fix.sigma).collect();
+    robust::median(&mut sigmas)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_headings_name_says_its_unit_before_the_config_does() {
+        let read = |path, angle, angles| headings(path, &[(0.0, angle)], angles).map(|h| h[0].1);
+        let quarter = std::f64::consts::FRAC_PI_2;
+        assert!(read("/ship.heading_rad", quarter, Some(AngleUnit::Degrees)).is_ok_and(|h| h == quarter));
+        assert!(read("/ship.heading_deg", 90.0, Some(AngleUnit::Radians)).is_ok_and(|h| h == quarter));
+        assert!(read("/ship.heading", 90.0, Some(AngleUnit::Degrees)).is_ok_and(|h| h == quarter));
+        assert!(matches!(read("/ship.heading", 1.0, None), Err(DiveError::NoUnit { .. })));
+    }
+
+    #[test]
+    fn degrees_are_no_headings_in_radians() {
+        let found = headings("/ship.heading", &[(0.0, 1.0), (1.0, 90.0)], Some(AngleUnit::Radians));
+        assert!(matches!(found, Err(DiveError::NotAngles { beyond: 1, count: 2, .. })), "{found:?}");
+    }
+}
