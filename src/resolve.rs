@@ -22,8 +22,7 @@ use crate::time::Time;
 pub enum ResolveError {
     /// The track would have more points than anyone can read.
     #[error(
-        "output.rate_hz is {rate_hz}, which makes {points:.0} points over {span_s:.0} s with the extrapolation, expected \
-         at most {most:.0}"
+        "output.rate_hz is {rate_hz}, which makes {points:.0} points over {span_s:.0} s, expected at most {most:.0}"
     )]
     TooManyPoints {
         /// The rate that was asked for, Hz.
@@ -54,7 +53,9 @@ impl ResolveError {
     #[must_use]
     pub fn hint(&self) -> String {
         match self {
-            Self::TooManyPoints { .. } => "lower `output.rate_hz` or `extrapolation.horizon_s`".into(),
+            Self::TooManyPoints { .. } => {
+                "lower `output.rate_hz`, or of `trackfuse fuse` `extrapolation.horizon_s`".into()
+            }
             Self::Epochs { .. } => "set `time = \"log\"` for both sources".into(),
         }
     }

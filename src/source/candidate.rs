@@ -6,6 +6,7 @@ use std::fmt;
 use super::SourceError;
 use super::fix::fix;
 use super::polar::is_polar;
+use super::recorded::config_of;
 use super::topic::{is_reference, sensor_word, vector_is};
 use crate::log::decode::{Decoder, MessagePath, Value};
 use crate::log::{Channel, Index, Log, LogError};
@@ -23,22 +24,16 @@ const OWN_SCHEMAS: [&str; 7] = [
     "trackfuse_msgs/msg/UsblFix",
 ];
 
-/// What an earlier run's topics are called below its prefix.
-const OWN_NAMES: [&str; 13] = [
-    "track",
-    "pcf",
-    "events",
-    "residuals",
-    "scene",
-    "pose",
-    "log",
-    "path",
-    "fix",
-    "geojson",
-    "prediction",
-    "fixes",
-    "track_fix",
-];
+/// What the topics of every run are called below its prefix.
+const OWN_NAMES: [&str; 5] = ["track", "scene", "pose", "log", "path"];
+
+/// What those of `fuse` are called besides, and what where it knows latitudes.
+const FUSED_NAMES: [&str; 3] = ["pcf", "events", "residuals"];
+const FUSED_PLACES: [&str; 2] = ["fix", "geojson"];
+
+/// The same of `usbl`, which leaves `fix` to the sensor.
+const USBL_NAMES: [&str; 2] = ["prediction", "fixes"];
+const USBL_PLACES: [&str; 2] = ["track_fix", "geojson"];
 
 /// Where the usual messages keep a position, the most specific first.
 const POSITION_FIELDS: [&str; 6] =
@@ -126,7 +121,7 @@ pub struct Judgement {
 #[must_use]
 pub fn judge(log: &Log) -> Judgement {
     let index = log.index();
-    let own = own_topics(index);
+    let own = own_topics(log);
     let (mut decoders, mut verdicts) = (BTreeMap::new(), BTreeMap::new());
     let silent = silent(index);
     for channel in index.channels.values() {
@@ -167,24 +162,37 @@ pub fn judge(log: &Log) -> Judgement {
     Judgement { log: log.path().display().to_string(), channels, damaged }
 }
 
-/// The topics of earlier runs, whose prefixes their metadata records name, and where those are lost their schemas.
-fn own_topics(index: &Index) -> BTreeSet<String> {
-    let of_own_schema = |c: &&Channel| {
-        let schema = index.schema_of(c);
-        schema.is_some_and(|s| OWN_SCHEMAS.contains(&s.name.as_str()))
+/// The topics of earlier runs as their metadata records tell them, and where those are lost their schemas.
+fn own_topics(log: &Log) -> BTreeSet<String> {
+    let index = log.index();
+    let own_schema = |c: &Channel| {
+        let name = index.schema_of(c).map(|s| s.name.as_str());
+        name.filter(|name| OWN_SCHEMAS.contains(name))
     };
+    let prefix_of = |topic: &str| topic.rsplit_once('/').map(|(prefix, _)| prefix.to_owned());
+    let schemas: Vec<(&str, &str)> =
+        index.channels.values().filter_map(|c| Some((c.topic.as_str(), own_schema(c)?))).collect();
     let recorded = index.metadata.iter().filter_map(|m| m.name.strip_prefix("trackfuse:"));
-    let by_schema =
-        index.channels.values().filter(of_own_schema).filter_map(|c| Some(c.topic.rsplit_once('/')?.0));
-    let prefixes: BTreeSet<&str> = recorded.chain(by_schema).collect();
-    let has = |topic: &str| index.channels_of(topic).next().is_some();
-    let below = |prefix: &&str| {
-        // a run that judges fixes leaves this name to the sensor's own topic
-        let names = OWN_NAMES.into_iter().filter(|name| *name != "fix" || !has(&format!("{prefix}/fixes")));
+    let prefixes: BTreeSet<String> =
+        recorded.map(str::to_owned).chain(schemas.iter().filter_map(|(topic, _)| prefix_of(topic))).collect();
+    let below = |prefix: &String| {
+        let judges_fixes = |(topic, schema): &(&str, &str)| {
+            schema.ends_with("UsblFix") && prefix_of(topic).as_ref() == Some(prefix)
+        };
+        let record = log.metadata(&format!("trackfuse:{prefix}")).ok().flatten();
+        let is_usbl = match record.as_ref().and_then(|record| record.get("command")) {
+            Some(command) => command == "usbl",
+            None => schemas.iter().any(judges_fixes),
+        };
+        let has_places = record.is_none_or(|record| config_of(&record).output.origin.is_some());
+        let (names, places): (&[&str], &[&str]) =
+            if is_usbl { (&USBL_NAMES, &USBL_PLACES) } else { (&FUSED_NAMES, &FUSED_PLACES) };
+        let places = places.iter().filter(|_| has_places);
+        let names = OWN_NAMES.iter().chain(names).chain(places);
         names.map(|name| format!("{prefix}/{name}")).collect::<Vec<_>>()
     };
-    let schemas = index.channels.values().filter(of_own_schema).map(|c| c.topic.clone());
-    prefixes.iter().flat_map(below).chain(schemas).collect()
+    let own = prefixes.iter().flat_map(below);
+    own.chain(schemas.iter().map(|(topic, _)| (*topic).to_owned())).collect()
 }
 
 /// What a topic of the log holds by its first message, whatever its name.

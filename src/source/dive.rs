@@ -170,7 +170,8 @@ pub fn load_dive(
 }
 
 /// What to know of heights that were altitudes.
-const ABOVE_ELLIPSOID: &str = "heights are altitudes, which may count from far off the sea's surface: `origin` in `[output]` with the                                surface's altitude puts z = 0 there, and `surface_at_zero = true` says so";
+const ABOVE_ELLIPSOID: &str = "heights are altitudes, whose zero may be far from the sea's surface: an `origin` in `[output]` \
+                               with the surface's altitude puts z = 0 there, and `surface_at_zero = true` says so";
 
 /// An error where the clock of `name`, which log times are `delay_s` behind, is of another epoch than the fixes'.
 fn one_epoch(name: &'static str, delay_s: f64, of_fixes: &Timing) -> Result<(), DiveError> {
@@ -184,7 +185,8 @@ fn bend(fixes: &Loaded) -> Option<String> {
     let far_m = robust::median(&mut far_m).filter(|_| fixes.fix_origin.is_some())?;
     (bend_m(far_m) > 1.0).then(|| {
         format!(
-            "the fixes lie {:.0} km from `origin` in `[output]`: z is the height above the level there, and altitudes in              `track_fix` are {:.0} m too high; an origin near the dive mends it",
+            "the fixes lie {:.0} km from `origin` in `[output]`: z is the height above the level there, and altitudes in `track_fix` \
+             are {:.0} m too high; an origin near the dive mends it",
             far_m / 1000.0,
             bend_m(far_m)
         )

@@ -302,9 +302,9 @@ fn t0_of(metadata: &BTreeMap<String, String>) -> Option<Time> {
 /// What is read of the config in the metadata.
 #[derive(Default, Deserialize)]
 #[serde(default)]
-struct MadeWith {
+pub(super) struct MadeWith {
     source: Vec<Paths>,
-    output: Place,
+    pub(super) output: Place,
 }
 
 #[derive(Default, Deserialize)]
@@ -316,11 +316,11 @@ struct Paths {
 
 #[derive(Default, Deserialize)]
 #[serde(default)]
-struct Place {
-    origin: Option<[f64; 3]>,
+pub(super) struct Place {
+    pub(super) origin: Option<[f64; 3]>,
 }
 
-fn config_of(metadata: &BTreeMap<String, String>) -> MadeWith {
+pub(super) fn config_of(metadata: &BTreeMap<String, String>) -> MadeWith {
     toml::from_str(metadata.get("config").map_or("", String::as_str)).unwrap_or_default()
 }
 
