@@ -124,7 +124,7 @@ pub fn load_dive(
         Some(track) if is_polar && !headings.is_empty() => warnings.extend(place(&mut fixes, &track, usbl)),
         _ if is_polar => return Err(SourceError::NoShip { path: path.into() }),
         Some(track) if usbl.sigma_of_range > 0.0 => {
-            warnings.extend(widen(&mut fixes, &track, usbl.sigma_of_range))
+            warnings.extend(widen(&mut fixes, &track, usbl.sigma_of_range));
         }
         _ => {}
     }

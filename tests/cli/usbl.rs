@@ -356,7 +356,7 @@ fn a_log_without_fixes_or_with_two_systems_says_how_to_name_them() {
 #[test]
 fn a_dive_that_is_mostly_wild_ends_with_a_warning() {
     let mut dive = Dive::new(17);
-    for fix in dive.fixes.iter_mut().filter(|f| (f.sample.time_s / 20.0) as usize % 2 == 0) {
+    for fix in dive.fixes.iter_mut().filter(|f| ((f.sample.time_s / 20.0) as usize).is_multiple_of(2)) {
         let far = 40.0 + fix.sample.time_s % 37.0 + 5.0 * (fix.sample.time_s / 20.0).floor() % 90.0;
         fix.sample.value[0] += far;
     }
