@@ -159,15 +159,15 @@ pub fn clean(
     if strays > 0 {
         found.warnings.push(Warning::Stray { count: strays, of: positions.len() });
     }
-    if !plan.sigma_is_guess {
-        found.noise_scale = found.longest().noise_scale;
-    } else {
+    if plan.sigma_is_guess {
         for (range, piece) in ranges.iter().zip(&found.pieces) {
             let [across, down] = piece.noise_scale;
             for fix in &mut positions[range.clone()] {
                 fix.sigma = [across * fix.sigma[0], across * fix.sigma[1], down * fix.sigma[2]];
             }
         }
+    } else {
+        found.noise_scale = found.longest().noise_scale;
     }
     found.noise_m = [0, 2].map(|axis| {
         let kept = positions.iter().zip(&found.judged).filter(|(_, judged)| judged.verdict == Verdict::Kept);

@@ -226,7 +226,9 @@ fn events(out: &mut String, report: &Report) -> fmt::Result {
 
 /// A number without needless digits.
 pub(super) fn short(v: f64) -> String {
-    let text = format!("{v:.2}");
+    // below 0.1 two digits that count
+    let decimals = if v == 0.0 || v.abs() >= 0.1 { 2.0 } else { 1.0 - v.abs().log10().floor() };
+    let text = format!("{v:.*}", (decimals as usize).min(12));
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
@@ -234,6 +236,11 @@ pub(super) fn short(v: f64) -> String {
 mod tests {
     use super::*;
     use crate::report::LawReport;
+
+    #[test]
+    fn a_low_rate_is_not_printed_as_none() {
+        assert_eq!([0.001, 0.0213, 0.1, 20.0, 0.0].map(short), ["0.001", "0.021", "0.1", "20", "0"]);
+    }
 
     #[test]
     fn a_law_that_would_clearly_have_been_better_is_named_with_what_to_ask_for() {

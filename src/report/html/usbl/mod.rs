@@ -12,7 +12,7 @@ use super::{Page, Part, Section};
 use crate::fusion::usbl::Dive;
 use crate::report::UsblReport;
 use crate::report::text::short;
-use crate::sample::{Sample, Source};
+use crate::sample::Source;
 use crate::time::Time;
 
 /// What the page is made of.

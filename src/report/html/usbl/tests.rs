@@ -6,6 +6,7 @@ use crate::estimate::usbl::Settings;
 use crate::fusion::usbl::{Causal, DivePlan, clean};
 use crate::report::UsblParts;
 use crate::report::html::{Plot, Style, Table};
+use crate::sample::Sample;
 use crate::source::{Loaded, SigmaOrigin, Timing};
 
 /// An hour's third at 1 m/s, an exchange of three fixes every 20 s; one fix of every fifth exchange is 300 m off, the
