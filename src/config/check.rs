@@ -103,9 +103,9 @@ impl Usbl {
     fn check(&self) -> Result<(), ConfigError> {
         for (key, value) in [
             ("usbl.sigma_m", self.sigma_m),
-            ("usbl.range_sigma_m", Some(self.range_sigma_m)),
-            ("usbl.angle_sigma_deg", Some(self.angle_sigma_deg)),
-            ("usbl.heading_sigma_deg", Some(self.heading_sigma_deg)),
+            ("usbl.range_sigma_m", self.range_sigma_m),
+            ("usbl.angle_sigma_deg", self.angle_sigma_deg),
+            ("usbl.heading_sigma_deg", self.heading_sigma_deg),
             ("usbl.ship_sigma_m", self.ship_sigma_m),
             ("usbl.depth_sigma_m", Some(self.depth_sigma_m)),
             ("usbl.speed_limit_m_s", Some(self.speed_limit_m_s)),

@@ -44,12 +44,18 @@ pub struct Usbl {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(example = &"deg")]
     pub angles: Option<AngleUnit>,
-    /// Standard deviation of a range, m.
-    pub range_sigma_m: f64,
-    /// Standard deviation of a bearing and a depression, degrees.
-    pub angle_sigma_deg: f64,
-    /// Standard deviation of the ship's heading, degrees.
-    pub heading_sigma_deg: f64,
+    /// Standard deviation of a range, m; default: 0.5, a guess.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = 0.5)]
+    pub range_sigma_m: Option<f64>,
+    /// Standard deviation of a bearing and a depression, degrees; default: 0.3, a guess.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = 0.3)]
+    pub angle_sigma_deg: Option<f64>,
+    /// Standard deviation of the ship's heading, degrees; default: 0.3, a guess.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(example = 0.3)]
+    pub heading_sigma_deg: Option<f64>,
     /// Standard deviation of the ship's position an axis, m; default: from the messages, else estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(example = 1.0)]
@@ -85,9 +91,9 @@ impl Default for Usbl {
             ship: None,
             heading: None,
             angles: None,
-            range_sigma_m: 0.5,
-            angle_sigma_deg: 0.3,
-            heading_sigma_deg: 0.3,
+            range_sigma_m: None,
+            angle_sigma_deg: None,
+            heading_sigma_deg: None,
             ship_sigma_m: None,
             depth: None,
             depth_sigma_m: 1.0,
@@ -96,6 +102,19 @@ impl Default for Usbl {
             cycle_s: None,
             prediction: Causal::Improved,
         }
+    }
+}
+
+impl Usbl {
+    /// Standard deviations of a range, m, of a bearing and a depression, rad, and of the ship's heading, rad; and whether the
+    /// config states any of them. The defaults are guesses.
+    #[must_use]
+    pub fn polar_sigmas(&self) -> ([f64; 3], bool) {
+        let angle = |stated: Option<f64>| stated.unwrap_or(0.3).to_radians();
+        let sigmas =
+            [self.range_sigma_m.unwrap_or(0.5), angle(self.angle_sigma_deg), angle(self.heading_sigma_deg)];
+        let stated = [self.range_sigma_m, self.angle_sigma_deg, self.heading_sigma_deg];
+        (sigmas, stated.iter().any(Option::is_some))
     }
 }
 

@@ -128,14 +128,21 @@ pub fn load_dive(
         Some(path) if is_polar => headings(path, &turns, usbl.angles)?,
         _ => Vec::new(),
     };
+    let ([range_sigma_m, angle_sigma_rad, heading_sigma_rad], stated) = usbl.polar_sigmas();
     let track = ship.as_ref().map(|ship| ShipTrack {
         positions: &ship.source.positions,
         headings: &headings,
-        heading_sigma_rad: usbl.heading_sigma_deg.to_radians(),
+        heading_sigma_rad,
     });
     match track {
         Some(track) if is_polar && !headings.is_empty() => {
-            warnings.extend(place(&mut fixes, &track, usbl, time)?);
+            warnings.extend(place(
+                &mut fixes,
+                &track,
+                [range_sigma_m, angle_sigma_rad, angle_sigma_rad],
+                stated,
+                time,
+            )?);
         }
         _ if is_polar => return Err(DiveError::NoShip { path: path.into() }.into()),
         Some(track) if usbl.sigma_of_range > 0.0 => {

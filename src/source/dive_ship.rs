@@ -2,7 +2,7 @@
 
 use super::dive_error::{DiveError, Span};
 use super::load::{Loaded, SigmaOrigin};
-use crate::config::{AngleUnit, Usbl};
+use crate::config::AngleUnit;
 use crate::estimate::usbl::geometry::{self, Polar};
 use crate::estimate::usbl::ship::{MOST_GAP_S, ShipTrack};
 use crate::estimate::usbl::sigma_at_range;
@@ -38,20 +38,21 @@ pub(super) fn headings(
 }
 
 /// Turns ranges, bearings and depressions into positions; those of instants at which the ship is not known are left out,
-/// with a sentence. Times count from `origin`.
+/// with a sentence. `sigma` is that of ranges, m, bearings and depressions, rad, and `stated` by the config or not. Times
+/// count from `origin`.
 ///
 /// # Errors
 /// [`DiveError::ShipElsewhere`] where none is left.
 pub(super) fn place(
     fixes: &mut Loaded,
     ship: &ShipTrack<'_>,
-    usbl: &Usbl,
+    sigma: [f64; 3],
+    stated: bool,
     origin: Time,
 ) -> Result<Option<String>, DiveError> {
-    let angle = usbl.angle_sigma_deg.to_radians();
     let measured = |raw: &Sample| {
         let [range_m, bearing_rad, depression_rad] = raw.value;
-        let seen = Polar { range_m, bearing_rad, depression_rad, sigma: [usbl.range_sigma_m, angle, angle] };
+        let seen = Polar { range_m, bearing_rad, depression_rad, sigma };
         Some(geometry::fix(raw.time_s, &seen, &ship.at(raw.time_s)?))
     };
     let placed: Vec<Option<Sample>> = fixes.source.positions.iter().map(measured).collect();
@@ -66,8 +67,6 @@ pub(super) fn place(
     let mut kept = placed.iter().map(Option::is_some);
     fixes.arrival.retain(|_| kept.next() == Some(true));
     fixes.source.positions = placed.iter().flatten().copied().collect();
-    let is_default = |usbl: &Usbl| (usbl.range_sigma_m, usbl.angle_sigma_deg, usbl.heading_sigma_deg);
-    let stated = is_default(usbl) != is_default(&Usbl::default());
     let from = if stated { SigmaOrigin::Config } else { SigmaOrigin::Assumed };
     fixes.sigma[0] = median_sigma(fixes).map(|sigma| (sigma, from));
     let lost = count - known;
