@@ -138,6 +138,9 @@ fn median_sigma(fixes: &Loaded) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::SourceConfig;
+    use crate::sample::Source;
+    use crate::source::Timing;
 
     #[test]
     fn a_headings_name_says_its_unit_before_the_config_does() {
@@ -153,5 +156,40 @@ mod tests {
     fn degrees_are_no_headings_in_radians() {
         let found = headings("/ship.heading", &[(0.0, 1.0), (1.0, 90.0)], Some(AngleUnit::Radians));
         assert!(matches!(found, Err(DiveError::NotAngles { beyond: 1, count: 2, .. })), "{found:?}");
+    }
+
+    fn loaded(sigma: SigmaOrigin) -> Loaded {
+        let fix = |time_s: f64| Sample { time_s, value: [0.0, 0.0, -1000.0], sigma: [1.0; 3] };
+        let source = Source { positions: [0.0, 1.0, 90.0].map(fix).into(), ..Source::default() };
+        Loaded {
+            config: SourceConfig::default(),
+            source,
+            frame_id: String::new(),
+            fix_origin: None,
+            timing: Timing { clock: "stamp".into(), delay_s: 0.0, delay_spread_s: 0.0, delay_growth_s: 0.0 },
+            arrival: vec![0, 1, 2],
+            sigma: [Some((1.0, sigma)), None],
+            notes: Vec::new(),
+            warnings: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_fix_without_a_ship_keeps_the_noise_of_the_usual_range_and_the_median_is_the_widened_one() {
+        let positions = [0.0, 1.0].map(|time_s| Sample { time_s, value: [0.0; 3], sigma: [1.0; 3] });
+        let ship = ShipTrack { positions: &positions, headings: &[], heading_sigma_rad: 0.0 };
+        let mut fixes = loaded(SigmaOrigin::Config);
+        let said = widen(&mut fixes, &ship, 0.005, Time::from_ns(0)).expect("a ship");
+        assert!(said.is_some_and(|said| said.contains("1 of 3 fixes")));
+        let expected = 1.0_f64.hypot(5.0);
+        assert!(fixes.source.positions.iter().all(|fix| (fix.sigma[0] - expected).abs() < 1e-12));
+        assert!(fixes.sigma[0].is_some_and(|(sigma, _)| (sigma - expected).abs() < 1e-12));
+        // what nobody stated is not widened, and that is told
+        let mut fixes = loaded(SigmaOrigin::Estimated);
+        let said = widen(&mut fixes, &ship, 0.005, Time::from_ns(0)).expect("a ship");
+        assert!(
+            said.is_some_and(|said| said.contains("`sigma_m`"))
+                && fixes.source.positions[0].sigma == [1.0; 3]
+        );
     }
 }

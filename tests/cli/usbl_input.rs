@@ -77,8 +77,18 @@ fn what_is_wrong_with_the_ship_is_told() {
         let message = json!({"timestamp": stamp(ns(f64::from(t))), "position": null, "heading": 0.1});
         log.json("/ship/navigation", f64::from(t), &message);
     }
-    let trial = Trial::of(log.finish()).config(&format!("{SHIP}angles = \"rad\"\n"));
+    let config = format!("{SHIP}angles = \"rad\"\n");
+    let trial = Trial::of(log.finish()).config(&config);
     assert_says(&run(&trial, &[]).stderr, &["ship: 500 samples are left out"]);
+    // stamps since the ship's computer was switched on
+    let mut log = TrialLog::new();
+    for t in 0..100 {
+        let message = json!({"timestamp": stamp(u64::from(t) * 1_000_000_000 + 1), "position": xyz([0.0; 3]), "heading": 0.1});
+        log.json("/ship/navigation", f64::from(t), &message);
+    }
+    let message = json!({"timestamp": stamp(ns(1.0)), "range": 9.0, "bearing": 1.0, "depression": 1.0});
+    log.json("/usbl/raw", 1.0, &message);
+    refused(log.finish(), &config, &["the ship's clocks are of different epochs", "hint: `time = \"log\"`"]);
 }
 
 #[test]
