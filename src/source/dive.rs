@@ -2,7 +2,7 @@
 
 use super::dive_depth::{Beside, beside};
 use super::dive_error::DiveError;
-use super::dive_ship::{headings, place, widen};
+use super::dive_ship::{placed, widened};
 use super::gathered::{Gathered, Kind};
 use super::load::{DIFFERENT_EPOCHS_S, Loaded, Readers, lack};
 use super::numbers::{Numbers, Series};
@@ -10,7 +10,6 @@ use super::{SourceError, Timing};
 use crate::config::{SourceConfig, Usbl};
 use crate::estimate::usbl::Height;
 use crate::estimate::usbl::geometry::bend_m;
-use crate::estimate::usbl::ship::ShipTrack;
 use crate::log::{Log, MessagesRead, passed_over};
 use crate::math::robust;
 use crate::time::Time;
@@ -124,36 +123,11 @@ pub fn load_dive(
         Ok::<_, SourceError>(series.values)
     };
     let (turns, depths) = (series("heading", heading)?, series("depth", depth)?);
-    let headings = match &usbl.heading {
-        Some(path) if is_polar => headings(path, &turns, usbl.angles)?,
-        _ => Vec::new(),
-    };
-    let ([range_sigma_m, angle_sigma_rad, heading_sigma_rad], stated) = usbl.polar_sigmas();
-    let track = ship.as_ref().map(|ship| ShipTrack {
-        positions: &ship.source.positions,
-        headings: &headings,
-        heading_sigma_rad,
+    warnings.extend(match &ship {
+        _ if is_polar => placed(&mut fixes, ship.as_ref(), &turns, usbl, time)?,
+        Some(ship) if usbl.sigma_of_range > 0.0 => widened(&mut fixes, ship, usbl.sigma_of_range, time)?,
+        _ => None,
     });
-    match track {
-        Some(track) if is_polar && !headings.is_empty() => {
-            warnings.extend(place(
-                &mut fixes,
-                &track,
-                [range_sigma_m, angle_sigma_rad, angle_sigma_rad],
-                stated,
-                time,
-            )?);
-        }
-        _ if is_polar => return Err(DiveError::NoShip { path: path.into() }.into()),
-        Some(track) if usbl.sigma_of_range > 0.0 => {
-            let places = [Some(&fixes), ship.as_ref()].map(|l| l.is_some_and(|l| l.fix_origin.is_some()));
-            if places[0] != places[1] {
-                return Err(DiveError::OtherFrame { fixes_are_places: places[0] }.into());
-            }
-            warnings.extend(widen(&mut fixes, &track, usbl.sigma_of_range, time)?);
-        }
-        _ => {}
-    }
     if let Some(ship) = ship.filter(|_| is_polar) {
         (fixes.fix_origin, fixes.frame_id) = (ship.fix_origin, ship.frame_id);
     }

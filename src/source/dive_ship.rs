@@ -2,7 +2,7 @@
 
 use super::dive_error::{DiveError, Span};
 use super::load::{Loaded, SigmaOrigin};
-use crate::config::AngleUnit;
+use crate::config::{AngleUnit, Usbl};
 use crate::estimate::usbl::geometry::{self, Polar};
 use crate::estimate::usbl::ship::{MOST_GAP_S, ShipTrack};
 use crate::estimate::usbl::sigma_at_range;
@@ -11,11 +11,50 @@ use crate::math::robust;
 use crate::sample::Sample;
 use crate::time::Time;
 
+/// Turns ranges, bearings and depressions into positions seen from `ship`, whose headings are `turns` as they were read; a
+/// sentence where some are left out. Times count from `origin`.
+///
+/// # Errors
+/// [`DiveError::NoShip`] without a ship or a heading; those of [`headings`] and [`place`].
+pub(super) fn placed(
+    fixes: &mut Loaded,
+    ship: Option<&Loaded>,
+    turns: &[(f64, f64)],
+    usbl: &Usbl,
+    origin: Time,
+) -> Result<Option<String>, DiveError> {
+    let (Some(ship), Some(path)) = (ship, &usbl.heading) else {
+        return Err(DiveError::NoShip { path: fixes.config.position.clone().unwrap_or_default() });
+    };
+    let headings = headings(path, turns, usbl.angles)?;
+    let ([range_m, angle_rad, heading_sigma_rad], stated) = usbl.polar_sigmas();
+    let track = ShipTrack { positions: &ship.source.positions, headings: &headings, heading_sigma_rad };
+    place(fixes, &track, [range_m, angle_rad, angle_rad], stated, origin)
+}
+
+/// Adds the noise that grows with the range from `ship`: see [`widen`].
+///
+/// # Errors
+/// [`DiveError::OtherFrame`]; those of [`widen`].
+pub(super) fn widened(
+    fixes: &mut Loaded,
+    ship: &Loaded,
+    share: f64,
+    origin: Time,
+) -> Result<Option<String>, DiveError> {
+    let fixes_are_places = fixes.fix_origin.is_some();
+    if fixes_are_places != ship.fix_origin.is_some() {
+        return Err(DiveError::OtherFrame { fixes_are_places });
+    }
+    let track = ShipTrack { positions: &ship.source.positions, headings: &[], heading_sigma_rad: 0.0 };
+    widen(fixes, &track, share, origin)
+}
+
 /// Headings by time in radians; `angles` is the unit where the field's name doesn't say one.
 ///
 /// # Errors
 /// [`DiveError::NoUnit`]; [`DiveError::NotAngles`] where one of them is more than a turn.
-pub(super) fn headings(
+fn headings(
     path: &str,
     values: &[(f64, f64)],
     angles: Option<AngleUnit>,
@@ -43,7 +82,7 @@ pub(super) fn headings(
 ///
 /// # Errors
 /// [`DiveError::ShipElsewhere`] where none is left.
-pub(super) fn place(
+fn place(
     fixes: &mut Loaded,
     ship: &ShipTrack<'_>,
     sigma: [f64; 3],
@@ -84,7 +123,7 @@ pub(super) fn place(
 ///
 /// # Errors
 /// [`DiveError::ShipElsewhere`] where it is known at no fix.
-pub(super) fn widen(
+fn widen(
     fixes: &mut Loaded,
     ship: &ShipTrack<'_>,
     share: f64,

@@ -167,7 +167,8 @@ fn late_and_repeated_messages_change_nothing_but_their_marks() {
     assert_eq!(marked, n.div_ceil(60));
     let came_late = said.iter().filter(|m| m.value["late"] == true);
     let mut came_late: Vec<i64> = came_late.map(super::trial::Written::timestamp_ns).collect();
-    (came_late.sort_unstable(), late.sort_unstable());
+    came_late.sort_unstable();
+    late.sort_unstable();
     assert_eq!(came_late, late);
 }
 
