@@ -139,6 +139,7 @@ impl CommandError {
             Self::Source(error) => error.hint(),
             Self::Resolve(error) => Some(error.hint()),
             Self::Export(error) => Some(error.hint()),
+            Self::Estimate(error) => error.hint(),
             Self::File { .. } => {
                 Some("a scenario is a TOML file, such as `sample_logs/steep_climb.scenario.toml`".into())
             }
