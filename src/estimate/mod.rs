@@ -127,6 +127,9 @@ impl EstimateError {
     pub fn hint(&self) -> Option<String> {
         match self {
             Self::OffDepth { .. } => Some("check sign, unit and zero of `usbl.depth`".into()),
+            Self::Held { .. } => {
+                Some("a system may say its last fix again while it hears nothing: look for a channel without these".into())
+            }
             _ => None,
         }
     }

@@ -144,10 +144,12 @@ pub fn clean(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Resul
     // what it says of noise, motion and wild shares, then a second one that knows
     let dive = Dive::new(scaled([first_scale; 2]), found, candidates, &heights);
     let mut switches = Switches::new(&dive, &first.chosen, PRIOR_WILD);
+    drop(first);
     let mut fit = Fit { scale: [1.0; 2], density: [density; 2], speed_m_s: 0.5 * settings.speed_limit_m_s };
     fit.settle(&dive, &switches, FIRST_STEPS)?;
     let wild = switches.shares(PRIOR_WILD, PRIOR_WORTH);
     let scale = fit.scale.map(|s| s * first_scale);
+    drop(dive); // a second one beside it would be the most memory that is ever needed
     let scaled_fixes = scaled(scale);
     let (found, candidates) = exchanges(&scaled_fixes, &groups, wild, within_m_s);
     let second = search(&found, &candidates, wild, motion(fit.density));

@@ -31,7 +31,7 @@ const RIVAL_SIGMAS: f64 = 3.0;
 const RIVAL_FIX_SIGMAS: f64 = 5.0;
 
 /// Most stretches in which another track is allowed that are told one by one.
-const MOST_AMBIGUOUS: usize = 10;
+pub(super) const MOST_AMBIGUOUS: usize = 10;
 
 /// More exchanges at which the vehicle is surely too fast are no accident.
 const FEW_FAST: usize = 3;
@@ -125,13 +125,20 @@ fn wild_stretches(dive: &Dive, switches: &Switches) -> Vec<Warning> {
     stretches
 }
 
-/// Where another history of what was wild is nearly as likely: stretches that don't overlap, the likeliest, in order of
-/// time.
+/// Where another history of what was wild is nearly as likely.
 fn ambiguous(evidence: &Evidence) -> Vec<Warning> {
-    let mut worth: Vec<Dispute> =
-        evidence.disputes.iter().filter(|dispute| is_worth_telling(dispute, evidence)).copied().collect();
-    worth.sort_by_key(|dispute| (dispute.from, dispute.to));
-    worth.dedup_by(|next, last| {
+    let worth = evidence.disputes.iter().filter(|dispute| is_worth_telling(dispute, evidence)).copied();
+    let told = |dispute: Dispute| {
+        let [from_s, to_s] = [dispute.from, dispute.to].map(|e| evidence.dive.exchanges[e].time_s);
+        Warning::Ambiguous { from_s, to_s, apart_m: dispute.apart_m, odds: dispute.log_odds.exp() }
+    };
+    merged(worth.collect()).into_iter().map(told).collect()
+}
+
+/// Those that overlap as one with the worst of each: the likeliest, in order of time.
+pub(super) fn merged(mut disputes: Vec<Dispute>) -> Vec<Dispute> {
+    disputes.sort_by_key(|dispute| (dispute.from, dispute.to));
+    disputes.dedup_by(|next, last| {
         let overlaps = next.from <= last.to;
         if overlaps {
             last.to = last.to.max(next.to);
@@ -140,14 +147,10 @@ fn ambiguous(evidence: &Evidence) -> Vec<Warning> {
         }
         overlaps
     });
-    worth.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
-    worth.truncate(MOST_AMBIGUOUS);
-    worth.sort_by_key(|dispute| dispute.from);
-    let told = |dispute: &Dispute| {
-        let [from_s, to_s] = [dispute.from, dispute.to].map(|e| evidence.dive.exchanges[e].time_s);
-        Warning::Ambiguous { from_s, to_s, apart_m: dispute.apart_m, odds: dispute.log_odds.exp() }
-    };
-    worth.iter().map(told).collect()
+    disputes.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds));
+    disputes.truncate(MOST_AMBIGUOUS);
+    disputes.sort_by_key(|dispute| dispute.from);
+    disputes
 }
 
 fn is_worth_telling(dispute: &Dispute, evidence: &Evidence) -> bool {
