@@ -17,7 +17,7 @@ fn wild(share: f64) -> impl Fn(usize, usize) -> [f64; 3] {
 
 /// Another vehicle half of the time.
 fn shared(_: usize, k: usize) -> [f64; 3] {
-    if k % 2 == 0 { [200.0, -100.0, 30.0] } else { [0.0; 3] }
+    if k.is_multiple_of(2) { [200.0, -100.0, 30.0] } else { [0.0; 3] }
 }
 
 fn stated(sigma_m: f64, mut fixes: Vec<Sample>) -> Cleaned {
@@ -52,9 +52,12 @@ fn another_vehicle_among_the_fixes_is_told_and_wild_fixes_are_none() {
 #[test]
 fn noise_that_is_not_that_within_exchanges_is_told_whatever_was_stated() {
     let told = |track: &Cleaned| track.warnings.iter().any(|w| matches!(w, Warning::NoiseWithin { .. }));
-    for off in [&shared as &dyn Fn(usize, usize) -> [f64; 3], &wild(0.5)] {
-        let track = stated(120.0, fixes(off));
-        assert!(told(&track), "{:?}", track.warnings);
+    let both = stated(120.0, fixes(shared));
+    assert!(told(&both), "{:?}", both.warnings);
+    for sigma_m in [3.0, 15.0, 50.0, 120.0] {
+        let track = stated(sigma_m, fixes(wild(0.5)));
+        let many = track.warnings.iter().any(|w| matches!(w, Warning::ManyWildFixes { .. }));
+        assert!(many || told(&track), "{sigma_m}: {:?}", track.warnings);
     }
     for sigma_m in [1.0, 3.0, 30.0] {
         let track = stated(sigma_m, fixes(|_, _| [0.0; 3]));
