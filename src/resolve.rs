@@ -160,7 +160,9 @@ pub fn dive_plan(
     fixes: &Source,
     origin: Time,
 ) -> Result<DivePlan, ResolveError> {
-    let span_s = fixes.span_s().map_or(0.0, |(from, to)| to - from);
+    let bridge_max_s = config.usbl.bridge_max_s;
+    let steps = fixes.positions.windows(2).map(|w| w[1].time_s - w[0].time_s);
+    let span_s = steps.filter(|step| *step <= bridge_max_s).sum::<f64>();
     let rate_hz = match config.output.rate_hz {
         Some(rate_hz) if rate_hz * span_s > MAX_POINTS => {
             let points = rate_hz * span_s;
@@ -180,12 +182,14 @@ pub fn dive_plan(
         origin,
         frame_id,
         rate_hz,
+        bridge_max_s,
         settings: usbl::Settings { speed_limit_m_s: usbl.speed_limit_m_s, ..usbl::Settings::default() },
         cycle_s: usbl.cycle_s,
         causal: match usbl.prediction {
             config::Causal::Improved => Causal::Improved,
             config::Causal::Paper => Causal::Paper,
         },
+        sigma_is_guess: !loaded.sigma[0].is_some_and(|(_, from)| from.is_stated()),
     })
 }
 

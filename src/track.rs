@@ -137,7 +137,7 @@ pub struct TrackPoint {
 }
 
 /// A track: points in order of time in one frame.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Track {
     /// The frame that the coordinates are in; empty where the log doesn't say.
     pub frame_id: String,

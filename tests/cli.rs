@@ -32,6 +32,7 @@ mod cli {
     mod trial;
     mod trial_log;
     mod usbl;
+    mod usbl_time;
     mod verify;
     mod viewer_topics;
 }

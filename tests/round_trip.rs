@@ -210,7 +210,7 @@ fn every_sample_log_keeps_its_bytes_and_messages() {
     let mut logs = Vec::new();
     all_logs(&Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_logs"), &mut logs);
     logs.retain(|path| !path.to_string_lossy().ends_with(".fused.mcap"));
-    assert_eq!(logs.len(), 3, "{logs:?}");
+    assert_eq!(logs.len(), 4, "{logs:?}");
     let out = dir.path().join("out.mcap");
     for path in logs {
         for compression in [Compression::Zstd, Compression::Lz4, Compression::None] {

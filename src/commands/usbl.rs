@@ -49,7 +49,7 @@ pub fn usbl(args: &Addition) -> Result<Outcome, CommandError> {
     let begun = if args.in_place { None } else { Some(begin()?) };
     bar.doing("cleaning");
     let plan = resolve::dive_plan(&mut config, &loaded, &fixes, origin)?;
-    let dive = fusion::usbl::clean(&fixes, &loaded.late, &heights, &plan)?;
+    let dive = fusion::usbl::clean(&fixes, &loaded.arrival, &heights, &plan)?;
     addition::check_finite(&dive.fusion.track)?;
     config.usbl.cycle_s = Some(dive.cycle_s);
 
@@ -58,9 +58,11 @@ pub fn usbl(args: &Addition) -> Result<Outcome, CommandError> {
     config.output.t0_ns = Some(t0.ns());
     let shift_s = resolve::log_time_shift_s(&loaded);
     warnings.extend(resolve::warnings_of(std::slice::from_ref(&loaded), shift_s));
-    let stated =
-        loaded.sigma[0].is_some_and(|(_, from)| matches!(from, SigmaOrigin::Config | SigmaOrigin::Messages));
-    let told = dive.cleaned.warnings.iter().filter(|w| stated || !matches!(w, Warning::Noise { .. }));
+    if plan.sigma_is_guess {
+        loaded.sigma[0] = Some((dive.noise_m[0], SigmaOrigin::Estimated));
+    }
+    let told = dive.pieces.iter().flat_map(|piece| &piece.warnings).chain(&dive.warnings);
+    let told = told.filter(|w| !plan.sigma_is_guess || !matches!(w, Warning::Noise { .. }));
     warnings.extend(told.map(|w| w.clone().later(origin.seconds_since(t0)).to_string()));
     let (input_name, output_name) =
         (args.log.display().to_string(), destination.path(&log).display().to_string());
@@ -93,14 +95,14 @@ pub fn usbl(args: &Addition) -> Result<Outcome, CommandError> {
         geodetic,
     };
     let metadata = addition::metadata(&log, &config, "usbl", &report)?;
-    let parts = html::usbl::Parts { report: &report, dive: &dive, fixes: &fixes.positions, origin, t0 };
+    let parts = html::usbl::Parts { report: &report, dive: &dive, origin, t0 };
     let page = html_report::prepare(args, &metadata, |provenance, config| {
         html::usbl::page(parts, provenance, config)
     })?;
     let mut appender = begun.map_or_else(begin, Ok)?;
     appender.leave_out(bad_chunks(&damaged));
     bar.doing("writing the track");
-    let judged = usbl_fix_messages(&fixes.positions, &dive.cleaned.judged, &plan.frame_id, context);
+    let judged = usbl_fix_messages(&dive.fixes, &dive.judged, &plan.frame_id, context);
     let prediction = track_messages(Topic::Prediction, &dive.prediction, context);
     let places = fix_messages(Topic::TrackFix, &dive.fusion, context);
     let more: Vec<Stream<'_>> = vec![Box::new(prediction), Box::new(judged), Box::new(places)];

@@ -1,7 +1,16 @@
 //! Every value of a config held to its range.
 
-use super::{Config, ConfigError};
+use super::{Config, ConfigError, Usbl};
 use crate::estimate::registration::Kind;
+
+fn range(ok: bool, key: String, value: String, expected: &'static str) -> Result<(), ConfigError> {
+    if ok { Ok(()) } else { Err(ConfigError::Range { key, value, expected }) }
+}
+
+fn positive(key: &str, value: Option<f64>) -> Result<(), ConfigError> {
+    let ok = value.is_none_or(|v| v > 0.0 && v.is_finite());
+    range(ok, key.into(), format!("{:?}", value.unwrap_or_default()), "a positive number")
+}
 
 impl Config {
     /// Checks every value's range.
@@ -9,13 +18,6 @@ impl Config {
     /// # Errors
     /// [`ConfigError::Range`] for the first that is out of it.
     pub fn check(&self) -> Result<(), ConfigError> {
-        let range = |ok: bool, key: String, value: String, expected| {
-            if ok { Ok(()) } else { Err(ConfigError::Range { key, value, expected }) }
-        };
-        let positive = |key: &str, value: Option<f64>| {
-            let ok = value.is_none_or(|v| v > 0.0 && v.is_finite());
-            range(ok, key.into(), format!("{:?}", value.unwrap_or_default()), "a positive number")
-        };
         let (output, fusion, beyond) = (&self.output, &self.fusion, &self.extrapolation);
         let plain = |c: char| c.is_alphanumeric() || "/_-.".contains(c);
         let prefix = output.prefix();
@@ -53,26 +55,7 @@ impl Config {
             fusion.window_points.to_string(),
             "1 to 100000",
         )?;
-        let usbl = &self.usbl;
-        positive("usbl.sigma_m", usbl.sigma_m)?;
-        positive("usbl.depth_sigma_m", Some(usbl.depth_sigma_m))?;
-        positive("usbl.range_sigma_m", Some(usbl.range_sigma_m))?;
-        positive("usbl.angle_sigma_deg", Some(usbl.angle_sigma_deg))?;
-        positive("usbl.heading_sigma_deg", Some(usbl.heading_sigma_deg))?;
-        positive("usbl.ship_sigma_m", usbl.ship_sigma_m)?;
-        let share_ok = (0.0..1.0).contains(&usbl.sigma_of_range);
-        range(share_ok, "usbl.sigma_of_range".into(), usbl.sigma_of_range.to_string(), "0 to 1")?;
-        let has_ship = usbl.ship.is_some() || usbl.sigma_of_range == 0.0;
-        range(
-            has_ship,
-            "usbl.sigma_of_range".into(),
-            usbl.sigma_of_range.to_string(),
-            "0 without `usbl.ship`",
-        )?;
-        positive("usbl.speed_limit_m_s", Some(usbl.speed_limit_m_s))?;
-        positive("usbl.cycle_s", usbl.cycle_s)?;
-        let latency_ok = usbl.latency_s.is_finite();
-        range(latency_ok, "usbl.latency_s".into(), usbl.latency_s.to_string(), "a finite number")?;
+        self.usbl.check()?;
         let priors = &self.registration;
         for kind in Kind::ALL {
             let key = format!("registration's {}", kind.name());
@@ -113,6 +96,31 @@ impl Config {
             range(offset_ok, key("offset_m"), format!("{:?}", source.offset_m), "three finite numbers")?;
         }
         Ok(())
+    }
+}
+
+impl Usbl {
+    fn check(&self) -> Result<(), ConfigError> {
+        for (key, value) in [
+            ("usbl.sigma_m", self.sigma_m),
+            ("usbl.range_sigma_m", Some(self.range_sigma_m)),
+            ("usbl.angle_sigma_deg", Some(self.angle_sigma_deg)),
+            ("usbl.heading_sigma_deg", Some(self.heading_sigma_deg)),
+            ("usbl.ship_sigma_m", self.ship_sigma_m),
+            ("usbl.depth_sigma_m", Some(self.depth_sigma_m)),
+            ("usbl.speed_limit_m_s", Some(self.speed_limit_m_s)),
+            ("usbl.bridge_max_s", Some(self.bridge_max_s)),
+            ("usbl.cycle_s", self.cycle_s),
+        ] {
+            positive(key, value)?;
+        }
+        let share = || ("usbl.sigma_of_range".to_owned(), self.sigma_of_range.to_string());
+        let ((key, value), ok) = (share(), (0.0..1.0).contains(&self.sigma_of_range));
+        range(ok, key, value, "0 to 1")?;
+        let ((key, value), ok) = (share(), self.ship.is_some() || self.sigma_of_range == 0.0);
+        range(ok, key, value, "0 without `usbl.ship`")?;
+        let latency_ok = self.latency_s.is_finite();
+        range(latency_ok, "usbl.latency_s".into(), self.latency_s.to_string(), "a finite number")
     }
 }
 

@@ -62,6 +62,8 @@ pub struct Usbl {
     pub depth_sigma_m: f64,
     /// The vehicle is rarely faster, m/s. Twice what a deep submersible does; towed vehicles need more.
     pub speed_limit_m_s: f64,
+    /// The longest silence that is bridged, s; a longer one parts the log into tracks of their own.
+    pub bridge_max_s: f64,
     /// Time from one acoustic exchange to the next, s, for the prediction; default: the fixes'.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(example = 20.0)]
@@ -89,6 +91,7 @@ impl Default for Usbl {
             depth: None,
             depth_sigma_m: 1.0,
             speed_limit_m_s: 2.5,
+            bridge_max_s: 1800.0,
             cycle_s: None,
             prediction: Causal::Improved,
         }

@@ -10,7 +10,7 @@ use crate::track::Phase;
 pub const OUTAGE_INTERVALS: f64 = 10.0;
 
 /// When each source sees the vehicle.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Coverage {
     /// For each source its runs of samples, `(from, to)` in s, in order.
     runs: Vec<Vec<(f64, f64)>>,

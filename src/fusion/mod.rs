@@ -83,7 +83,7 @@ pub struct SplineSummary {
 }
 
 /// The track and what is to be said of it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Fusion {
     /// The fused track with its extrapolation.
     pub track: Track,

@@ -96,7 +96,9 @@ pub struct UsblTrackReport {
     pub rate_hz: f64,
     /// First and last point, s since T0.
     pub span_s: (f64, f64),
-    /// Standard deviation of the noise over what was stated: horizontal, vertical.
+    /// Median standard deviation of the kept fixes' noise, m: horizontal, vertical.
+    pub noise_m: [f64; 2],
+    /// The same over what was stated, and 1 where nothing was.
     pub noise_scale: [f64; 2],
     /// Density of the vehicle's acceleration, m^2/s^3: horizontal, vertical.
     pub acceleration_density: [f64; 2],
@@ -172,10 +174,10 @@ impl UsblReport {
             output: parts.output.into(),
             t0_ns: t0.ns().to_string(),
             source: SourceReport::new(loaded, fixes, true, fixes.span_s().map(span)),
-            fixes: FixesReport::of(&dive.cleaned.judged),
+            fixes: FixesReport::of(&dive.judged),
             exchanges: ExchangesReport {
-                count: dive.cleaned.wild_cycles.len(),
-                thrown_out: dive.cleaned.wild_cycles.iter().filter(|wild| **wild).count(),
+                count: dive.exchanges().0,
+                thrown_out: dive.exchanges().1,
                 cycle_s: dive.cycle_s,
             },
             depth: parts.depth.map(|(path, samples)| DepthReport { path: path.into(), samples }),
@@ -185,8 +187,9 @@ impl UsblReport {
                 points: track.points.len(),
                 rate_hz: plan.rate_hz,
                 span_s: (end(track.points.first()), end(track.points.last())),
-                noise_scale: dive.cleaned.noise_scale,
-                acceleration_density: dive.cleaned.acceleration_density,
+                noise_scale: dive.noise_scale,
+                noise_m: dive.noise_m,
+                acceleration_density: dive.longest().acceleration_density,
             },
             phases: phases_of(&dive.fusion, std::slice::from_ref(fixes), span),
             prediction: PredictionReport {
@@ -292,14 +295,11 @@ fn fixes(out: &mut String, report: &UsblReport) -> fmt::Result {
 
 /// The noise of the fixes that were kept, beside what was stated.
 fn noise(report: &UsblReport) -> String {
-    let [across, down] = report.track.noise_scale;
-    match (report.source.position_sigma_m, &report.source.position_sigma_from) {
-        (Some(sigma), Some(from)) => format!(
-            "1 sigma of their noise is {:.2} m in x and y, {:.2} m in z ({sigma:.2} m: {from})",
-            across * sigma,
-            down * sigma
-        ),
-        _ => format!("their noise is {across:.2} times what was stated in x and y, {down:.2} times in z"),
+    let [across, down] = report.track.noise_m;
+    let found = format!("1 sigma of their noise is {across:.2} m in x and y, {down:.2} m in z");
+    match (report.source.position_sigma_m, report.source.position_sigma_from.as_deref()) {
+        (Some(sigma), Some(from)) if from != "estimated" => format!("{found} ({sigma:.2} m: {from})"),
+        _ => found,
     }
 }
 

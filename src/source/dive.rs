@@ -124,7 +124,7 @@ pub fn load_dive(
         Some(track) if is_polar && !headings.is_empty() => warnings.extend(place(&mut fixes, &track, usbl)),
         _ if is_polar => return Err(SourceError::NoShip { path: path.into() }),
         Some(track) if usbl.sigma_of_range > 0.0 => {
-            warnings.extend(widen(&mut fixes, &track, usbl.sigma_of_range))
+            warnings.extend(widen(&mut fixes, &track, usbl.sigma_of_range));
         }
         _ => {}
     }
@@ -178,10 +178,8 @@ fn widen(fixes: &mut Loaded, ship: &ShipTrack<'_>, share: f64) -> Option<String>
 
 /// Puts `found` in the fixes' place, and says how many there are of which the ship's `what` is not known.
 fn keep(fixes: &mut Loaded, found: &[Option<Sample>], what: &str) -> Option<String> {
-    let kept = found.iter().enumerate().filter(|(_, fix)| fix.is_some()).map(|(i, _)| i);
-    let late = |i: &usize| fixes.late.binary_search(i).is_ok();
-    let late = kept.enumerate().filter(|(_, old)| late(old)).map(|(new, _)| new).collect();
-    fixes.late = late;
+    let mut kept = found.iter().map(Option::is_some);
+    fixes.arrival.retain(|_| kept.next() == Some(true));
     fixes.source.positions = found.iter().flatten().copied().collect();
     let lost = found.len() - fixes.source.positions.len();
     (lost > 0).then(|| {

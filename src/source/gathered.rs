@@ -211,7 +211,8 @@ impl Gathered {
         let offset_m = self.config.offset_m;
         let mut source = Source { name: self.config.name.clone(), ..Source::default() };
         let mut sigma = [None, None];
-        let late = late(&self.readings[Quantity::Position as usize]);
+        let positions = &self.readings[Quantity::Position as usize];
+        let arrival = if self.kind == Kind::Track { Vec::new() } else { arrival(positions) };
         for quantity in Quantity::ALL {
             let readings = std::mem::take(&mut self.readings[quantity as usize]);
             let value = |reading: &Reading| {
@@ -251,7 +252,7 @@ impl Gathered {
             frame_id: fix_origin.map_or(frame_id.unwrap_or_default(), |_| "enu".to_owned()),
             fix_origin,
             timing,
-            late,
+            arrival,
             sigma,
             notes,
             warnings,
@@ -338,18 +339,11 @@ impl Fault {
     }
 }
 
-/// Which of the readings, in order of time, came after one of a later time.
-fn late(readings: &[Reading]) -> Vec<usize> {
-    let mut newest = None;
-    let mut came_late = |time: Time| {
-        let late = newest.is_some_and(|newest| time < newest);
-        newest = newest.max(Some(time));
-        late
-    };
-    let mut order: Vec<(Time, bool)> = Vec::with_capacity(readings.len());
-    order.extend(readings.iter().map(|r| (r.time, came_late(r.time))));
-    order.sort_by_key(|(time, _)| *time);
-    order.iter().enumerate().filter(|(_, (_, late))| *late).map(|(i, _)| i).collect()
+/// In order of time, which of the readings came first, second and so on.
+fn arrival(readings: &[Reading]) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..u32::try_from(readings.len()).unwrap_or(u32::MAX)).collect();
+    order.sort_by_key(|&i| readings[i as usize].time);
+    order
 }
 
 type Sigma = Option<(f64, SigmaOrigin)>;

@@ -24,6 +24,12 @@ pub enum SigmaOrigin {
 }
 
 impl SigmaOrigin {
+    /// Whether somebody said so.
+    #[must_use]
+    pub fn is_stated(self) -> bool {
+        matches!(self, Self::Config | Self::Messages)
+    }
+
     /// In words.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -63,8 +69,8 @@ pub struct Loaded {
     pub fix_origin: Option<[f64; 3]>,
     /// Its clock.
     pub timing: Timing,
-    /// The indices of positions that came after one of a later time.
-    pub late: Vec<usize>,
+    /// Of an acoustic system, the positions' order of coming: the first to come has 0. Empty for others.
+    pub arrival: Vec<u32>,
     /// Median standard deviation over axes and samples, m and m/s, and where it comes from.
     pub sigma: [Option<(f64, SigmaOrigin)>; 2],
     /// What is worth knowing of how it was read, a sentence each.

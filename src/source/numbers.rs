@@ -8,6 +8,9 @@ use crate::log::decode::{Decoder, MessagePath};
 use crate::log::{Index, Message};
 use crate::time::Time;
 
+/// Numbers in order of time, s, and what was left out, a sentence.
+pub(super) type Finished = (Vec<(f64, f64)>, Option<String>);
+
 /// The numbers at one message path.
 #[derive(Debug)]
 pub(super) struct Numbers {
@@ -72,7 +75,7 @@ impl Numbers {
     ///
     /// # Errors
     /// [`SourceError::NoNumber`] where there is none.
-    pub(super) fn finish(mut self, origin: Time) -> Result<(Vec<(f64, f64)>, Option<String>), SourceError> {
+    pub(super) fn finish(mut self, origin: Time) -> Result<Finished, SourceError> {
         if self.values.is_empty() {
             let (name, path) = (self.name.into(), self.path.to_string());
             return Err(SourceError::NoNumber { name, path, count: self.count });

@@ -26,7 +26,7 @@ fn commands_of_the_pages_print_what_the_pages_show_and_again_when_run_again() {
             fs::copy(entry.path(), folder.path().join("sample_logs").join(entry.file_name())).unwrap();
         }
     }
-    for page in ["README.md", "docs/logs.md"] {
+    for page in ["README.md", "docs/logs.md", "docs/usbl.md"] {
         let stored = fs::read_to_string(root.join(page)).unwrap();
         let updated = checked(&stored, folder.path());
         if updated != stored {

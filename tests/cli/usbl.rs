@@ -13,15 +13,15 @@ use trackfuse::simulate::{DiveConstants, SimulatedFix, Trajectory, UsblConstants
 use super::trial::{Output, Ran, Trial, assert_says, trackfuse};
 use super::trial_log::{TrialLog, ns, stamp, xyz};
 
-struct Dive {
-    truth: Trajectory,
-    fixes: Vec<SimulatedFix>,
-    silence_s: [f64; 2],
+pub(super) struct Dive {
+    pub(super) truth: Trajectory,
+    pub(super) fixes: Vec<SimulatedFix>,
+    pub(super) silence_s: [f64; 2],
 }
 
 impl Dive {
     /// An hour with 30 % wild fixes and four minutes of silence.
-    fn new(seed: u64) -> Self {
+    pub(super) fn new(seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let truth = dive(&DiveConstants::default(), &mut rng);
         let watched = UsblConstants { wild_fixes: 0.3, ..UsblConstants::default() };
@@ -29,11 +29,11 @@ impl Dive {
         Self { truth, fixes: record.fixes, silence_s: record.silence_s.unwrap() }
     }
 
-    fn position(&self, time_s: f64) -> [f64; 3] {
+    pub(super) fn position(&self, time_s: f64) -> [f64; 3] {
         self.truth.at(time_s).position.into()
     }
 
-    fn log(&self, message: impl Fn(&SimulatedFix) -> Value) -> Vec<u8> {
+    pub(super) fn log(&self, message: impl Fn(&SimulatedFix) -> Value) -> Vec<u8> {
         let mut log = TrialLog::new();
         self.fixes.iter().for_each(|fix| log.json("/usbl/fix", fix.sample.time_s, &message(fix)));
         log.finish()
@@ -41,7 +41,7 @@ impl Dive {
 
     /// Root mean square 3-D distance of a track from the truth, seen and in the silence, and the share of single axes
     /// whose 95 % band holds it.
-    fn held_against(&self, track: &[super::trial::Written]) -> ([f64; 2], f64) {
+    pub(super) fn held_against(&self, track: &[super::trial::Written]) -> ([f64; 2], f64) {
         let (mut sums, mut held, mut axes) = ([(0.0, 0.0); 2], 0, 0);
         for point in track {
             let t = (point.timestamp_ns() - ns(0.0) as i64) as f64 * 1e-9;
@@ -59,11 +59,11 @@ impl Dive {
     }
 }
 
-fn xyz_message(fix: &SimulatedFix) -> Value {
+pub(super) fn xyz_message(fix: &SimulatedFix) -> Value {
     json!({"timestamp": stamp(ns(fix.sample.time_s)), "frame_id": "enu", "position": xyz(fix.sample.value)})
 }
 
-fn run(trial: &Trial, args: &[&str]) -> Ran {
+pub(super) fn run(trial: &Trial, args: &[&str]) -> Ran {
     let config: &[&str] = if trial.path("trial.toml").exists() { &["--config", "trial.toml"] } else { &[] };
     trackfuse(trial.folder(), &[&["usbl", "in.mcap"], config, args].concat())
 }
@@ -75,7 +75,7 @@ fn report(trial: &Trial, code: i32) -> (Value, Output) {
     (serde_json::from_str(&ran.stdout).unwrap(), Output::read(&trial.path("in.usbl.mcap")))
 }
 
-const SIGMA: &str = "[usbl]\nsigma_m = 3.0\n";
+pub(super) const SIGMA: &str = "[usbl]\nsigma_m = 3.0\n";
 
 #[test]
 fn a_dive_becomes_a_track_with_honest_bands_and_every_wild_fix_is_flagged() {
@@ -356,7 +356,7 @@ fn a_log_without_fixes_or_with_two_systems_says_how_to_name_them() {
 #[test]
 fn a_dive_that_is_mostly_wild_ends_with_a_warning() {
     let mut dive = Dive::new(17);
-    for fix in dive.fixes.iter_mut().filter(|f| (f.sample.time_s / 20.0) as usize % 2 == 0) {
+    for fix in dive.fixes.iter_mut().filter(|f| ((f.sample.time_s / 20.0) as usize).is_multiple_of(2)) {
         let far = 40.0 + fix.sample.time_s % 37.0 + 5.0 * (fix.sample.time_s / 20.0).floor() % 90.0;
         fix.sample.value[0] += far;
     }

@@ -1,4 +1,5 @@
-//! The layout beside the sample logs shows a fused one: every topic, message path and frame in it is there.
+//! The layouts beside the sample logs show a fused one and a cleaned dive: every topic, message path and frame in them is
+//! there.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -7,10 +8,17 @@ use std::path::Path;
 use serde_json::Value;
 use trackfuse::log::decode::{self, Decoder, MessagePath};
 
-use super::fused::{NAMES, fused};
+use super::fused::{DIVE, NAMES, fused};
+
+/// The layouts, and the prefix of the topics that each shows.
+const LAYOUTS: [&str; 2] = ["fused", "usbl"];
 
 fn layout() -> Value {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("sample_logs/fused.layout.json");
+    layout_of("fused")
+}
+
+fn layout_of(prefix: &str) -> Value {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("sample_logs/{prefix}.layout.json"));
     serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
 }
 
@@ -60,29 +68,30 @@ fn shown(tree: &Value, panels: &mut Vec<String>) {
 }
 
 #[test]
-fn layout_has_each_panel_once_with_a_title_for_both_viewers() {
-    let layout = layout();
-    let configs = layout["configById"].as_object().unwrap();
-    let mut panels = Vec::new();
-    shown(&layout["layout"], &mut panels);
-    let unique: BTreeSet<&String> = panels.iter().collect();
-    assert_eq!(unique.len(), panels.len(), "{panels:?}");
-    assert_eq!(unique, configs.keys().collect());
-    for (id, config) in configs {
-        assert_eq!(text(config, "lichtblickPanelTitle"), text(config, "foxglovePanelTitle"), "{id}");
+fn layouts_have_each_panel_once_with_a_title_for_both_viewers() {
+    for layout in LAYOUTS.map(layout_of) {
+        let configs = layout["configById"].as_object().unwrap();
+        let mut panels = Vec::new();
+        shown(&layout["layout"], &mut panels);
+        let unique: BTreeSet<&String> = panels.iter().collect();
+        assert_eq!(unique.len(), panels.len(), "{panels:?}");
+        assert_eq!(unique, configs.keys().collect());
+        for (id, config) in configs {
+            assert_eq!(text(config, "lichtblickPanelTitle"), text(config, "foxglovePanelTitle"), "{id}");
+        }
+        for key in ["globalVariables", "userNodes"] {
+            assert_eq!(layout[key], serde_json::json!({}));
+        }
+        assert_eq!(layout["playbackConfig"]["speed"], 1);
     }
-    for key in ["globalVariables", "userNodes"] {
-        assert_eq!(layout[key], serde_json::json!({}));
-    }
-    assert_eq!(layout["playbackConfig"]["speed"], 1);
 }
 
 #[test]
-fn layout_message_paths_lead_to_values_in_a_fused_sample_log() {
-    for name in ["steep_climb", "oblique_climb"] {
+fn layout_message_paths_lead_to_values_in_a_sample_log_with_its_track() {
+    for (name, prefix) in [("steep_climb", "fused"), ("oblique_climb", "fused"), (DIVE, "usbl")] {
         let topics = topics(name);
         let mut checked = 0;
-        for (id, config) in layout()["configById"].as_object().unwrap() {
+        for (id, config) in layout_of(prefix)["configById"].as_object().unwrap() {
             let kind = id.split('!').next().unwrap();
             for path in config["paths"].as_array().into_iter().flatten() {
                 let path = text(path, "value");
@@ -111,19 +120,24 @@ fn layout_message_paths_lead_to_values_in_a_fused_sample_log() {
 }
 
 #[test]
-fn layout_draws_the_scene_and_the_pose_in_their_frame() {
-    let topics = topics("steep_climb");
-    let layout = layout();
-    let configs = layout["configById"].as_object().unwrap();
-    let (_, space) = configs.iter().find(|(id, _)| id.starts_with("3D!")).unwrap();
-    let drawn = space["topics"].as_object().unwrap();
-    assert_eq!(drawn.keys().collect::<Vec<_>>(), ["/fused/scene", "/fused/pose"]);
-    for (topic, settings) in drawn {
-        assert_eq!(settings["visible"], true);
-        assert!(["foxglove.SceneUpdate", "foxglove.PoseInFrame"].contains(&topics[topic].schema.as_str()));
-    }
-    for path in ["/fused/scene.entities[0].frame_id", "/fused/pose.frame_id"] {
-        assert_eq!(values(&topics, path)[0], decode::Value::Text(text(space, "followTf").into()), "{path}");
+fn layouts_draw_the_scene_and_the_pose_in_their_frame() {
+    for (name, prefix) in [("steep_climb", "fused"), (DIVE, "usbl")] {
+        let topics = topics(name);
+        let layout = layout_of(prefix);
+        let configs = layout["configById"].as_object().unwrap();
+        let (_, space) = configs.iter().find(|(id, _)| id.starts_with("3D!")).unwrap();
+        let drawn = space["topics"].as_object().unwrap();
+        let expected = ["scene", "pose"].map(|name| format!("/{prefix}/{name}"));
+        assert_eq!(drawn.keys().collect::<Vec<_>>(), expected.each_ref());
+        for (topic, settings) in drawn {
+            assert_eq!(settings["visible"], true);
+            let schema = topics[topic].schema.as_str();
+            assert!(["foxglove.SceneUpdate", "foxglove.PoseInFrame"].contains(&schema));
+        }
+        for path in [format!("/{prefix}/scene.entities[0].frame_id"), format!("/{prefix}/pose.frame_id")] {
+            let frame = decode::Value::Text(text(space, "followTf").into());
+            assert_eq!(values(&topics, &path)[0], frame, "{path}");
+        }
     }
 }
 
@@ -159,7 +173,7 @@ fn is_seen(camera: &Value, point: [f64; 3]) -> bool {
 }
 
 #[test]
-fn layout_camera_sees_the_climbs_from_end_to_end() {
+fn layout_cameras_see_the_climbs_and_the_dive_from_end_to_end() {
     let layout = layout();
     let camera = &layout["configById"]["3D!scene"]["cameraState"];
     for name in NAMES {
@@ -167,6 +181,11 @@ fn layout_camera_sees_the_climbs_from_end_to_end() {
         for point in track.iter().map(|p| p.as_vector3().unwrap()) {
             assert!(is_seen(camera, point), "{name}: {point:?}");
         }
+    }
+    let dive = layout_of("usbl");
+    let far = &dive["configById"]["3D!scene"]["cameraState"];
+    for point in values(&topics(DIVE), "/usbl/track.position").iter().map(|p| p.as_vector3().unwrap()) {
+        assert!(is_seen(far, point), "{DIVE}: {point:?}");
     }
     assert!(!is_seen(camera, [0.0, 0.0, 60.0]) && !is_seen(camera, [100.0, -100.0, -30.0]));
 }

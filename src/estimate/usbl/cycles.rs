@@ -85,17 +85,22 @@ pub fn cycle_time_s(means_s: &[f64]) -> Option<f64> {
 /// unless it is clearly so: the fit finds out.
 #[must_use]
 pub(super) fn first_noise_scale(fixes: &[Sample], groups: &[Range<usize>]) -> f64 {
-    /// The quarter quantile of a chi-square variable of three degrees of freedom.
-    const QUARTER: f64 = 1.212_532_903;
-    const FEWEST: usize = 20;
     const CLEAR: f64 = 2.0;
-    let pairs = groups.iter().flat_map(|group| fixes[group.clone()].windows(2));
-    let mut squares: Vec<f64> = pairs.map(|pair| pair_square(&pair[0], &pair[1])).collect();
-    if squares.len() < FEWEST {
-        return 1.0;
-    }
-    let scale = robust::quantile(&mut squares, 0.25).map_or(1.0, |q| (q / QUARTER).sqrt());
+    let scale = nearest_quarter(pairs(fixes, groups).map(|pair| pair_square(&pair[0], &pair[1])).collect())
+        .unwrap_or(1.0);
     if (CLEAR.recip()..=CLEAR).contains(&scale) { 1.0 } else { scale.max(1e-3) }
+}
+
+/// A guess of the noise's standard deviation an axis, m, from fixes of one exchange beside each other; `None` of too few.
+/// `fixes` ascend in time; their sigmas are not looked at.
+#[must_use]
+pub fn guessed_sigma_m(fixes: &[Sample]) -> Option<f64> {
+    let times: Vec<f64> = fixes.iter().map(|f| f.time_s).collect();
+    let groups = group(&times, exchange_gap_s(&times).max(LEAST_GAP_S));
+    // what is sent twice has no noise of its own
+    let differ = pairs(fixes, &groups).filter(|w| w[0].value != w[1].value);
+    let square = |w: &[Sample]| (0..3).map(|a| (w[1].value[a] - w[0].value[a]).powi(2)).sum::<f64>() / 2.0;
+    nearest_quarter(differ.map(square).collect()).filter(|sigma_m| *sigma_m > 0.0)
 }
 
 /// The noise's standard deviation over that of `fixes` by the nearest pairs of one exchange: what half of the fixes may be
@@ -126,9 +131,29 @@ fn pair_square(a: &Sample, b: &Sample) -> f64 {
         .sum()
 }
 
+/// Fixes that follow each other in one exchange.
+fn pairs<'a>(fixes: &'a [Sample], groups: &'a [Range<usize>]) -> impl Iterator<Item = &'a [Sample]> {
+    groups.iter().flat_map(|group| fixes[group.clone()].windows(2))
+}
+
+/// The scale of squares that are, as far as no wild fix is in them, chi-square variables of three degrees of freedom; `None`
+/// of too few.
+fn nearest_quarter(mut squares: Vec<f64>) -> Option<f64> {
+    /// Their quarter quantile.
+    const QUARTER: f64 = 1.212_532_903;
+    const FEWEST: usize = 20;
+    if squares.len() < FEWEST {
+        return None;
+    }
+    robust::quantile(&mut squares, 0.25).map(|quantile| (quantile / QUARTER).sqrt())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
 
     /// Exchanges of 3 to 6 fixes half a second apart at these times.
     fn fixes(exchanges: &[f64]) -> (Vec<f64>, Vec<usize>) {
@@ -172,6 +197,27 @@ mod tests {
         let paused: Vec<f64> = (0..300).map(|i| f64::from(i) + if i > 150 { 240.0 } else { 0.0 }).collect();
         assert!(found(&paused).iter().all(|&n| n == 1));
         assert!(found(&[]).is_empty() && found(&[3.0]) == [1]);
+    }
+
+    #[test]
+    fn the_noise_is_guessed_from_bursts_though_a_third_of_the_fixes_is_wild_and_some_come_twice() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        let mut fixes = Vec::new();
+        for i in 0..200 {
+            for k in 0..4 {
+                let time_s = 20.0 * f64::from(i) + 0.5 * f64::from(k);
+                let wild = if (i * 4 + k) % 3 == 0 { 80.0 } else { 0.0 };
+                let value = std::array::from_fn(|_| 0.7 * time_s + 3.0 * normal() + wild);
+                fixes.extend(std::iter::repeat_n(
+                    Sample { time_s, value, sigma: [1.0; 3] },
+                    1 + usize::from(k == 1),
+                ));
+            }
+        }
+        let sigma_m = guessed_sigma_m(&fixes).expect("enough");
+        assert!((2.5..5.5).contains(&sigma_m), "{sigma_m}");
+        assert_eq!(guessed_sigma_m(&fixes[..10]), None);
     }
 
     #[test]

@@ -29,6 +29,8 @@ pub enum Reason {
     OffDepth,
     /// It has the position of the one before it, or that of another one of its time.
     Repeated,
+    /// It and the few about it stand alone in time, too few for a track.
+    Stray,
 }
 
 impl Verdict {
@@ -53,6 +55,7 @@ impl Reason {
             Self::OffAsCycle => "off-as-cycle",
             Self::OffDepth => "off-depth",
             Self::Repeated => "repeated",
+            Self::Stray => "stray",
         }
     }
 }
@@ -72,6 +75,18 @@ pub struct Judged {
     pub residual_m: [f64; 3],
     /// Length of the residual over its standard deviation, which is the track's and the noise's together.
     pub residual_sigmas: f64,
+}
+
+impl Judged {
+    /// Before anything is known of a fix.
+    pub(crate) const UNJUDGED: Self = Self {
+        verdict: Verdict::Kept,
+        reason: Reason::Fits,
+        late: false,
+        cycle: 0,
+        residual_m: [f64::NAN; 3],
+        residual_sigmas: f64::NAN,
+    };
 }
 
 /// What a person must know of a track.
@@ -188,6 +203,33 @@ pub enum Warning {
         /// Standard deviation over that of the nearest fixes of one exchange.
         factor: f64,
     },
+    /// Some fixes stand alone in time.
+    #[error(
+        "{count} of {of} fixes are left out: a long silence parts them from the others, and they are too few for a track of \
+         their own; are their stamps right?"
+    )]
+    Stray {
+        /// How many.
+        count: usize,
+        /// Of how many.
+        of: usize,
+    },
+    /// Fixes came late, and not as acoustic systems do.
+    #[error(
+        "{count} of {of} fixes came after one of a later time, by up to {most_s:.0} s: was a clock set back? What was seen \
+         before and after may lie upon each other"
+    )]
+    Late {
+        /// How many.
+        count: usize,
+        /// Of how many.
+        of: usize,
+        /// How late the latest was, s.
+        most_s: f64,
+    },
+    /// The causal method never had a track.
+    #[error("there is no prediction: too few fixes came in order of time")]
+    NoPrediction,
     /// The noise differs from what was stated.
     #[error("the noise is {scale:.2} times what was stated")]
     Noise {

@@ -26,6 +26,7 @@ pub use lagrange::quadratic;
 pub use paper::{Paper, PaperSettings};
 pub use rls::Rls;
 
+use super::cycles::MOST_FIXES;
 use crate::sample::Sample;
 use crate::track::State;
 
@@ -61,10 +62,11 @@ impl Open {
         }
     }
 
-    /// The fixes of an exchange that is over at `now_s`.
+    /// The fixes of an exchange that is over at `now_s`, or has as many as one may have.
     fn over(&mut self, now_s: f64, cycle_s: f64) -> Option<Vec<Sample>> {
         let last = self.fixes.last()?;
-        (now_s - last.time_s > EXCHANGE_SHARE * cycle_s).then(|| std::mem::take(&mut self.fixes))
+        let is_over = now_s - last.time_s > EXCHANGE_SHARE * cycle_s || self.fixes.len() >= MOST_FIXES;
+        is_over.then(|| std::mem::take(&mut self.fixes))
     }
 }
 

@@ -25,7 +25,7 @@ const REASONS: [(Reason, &str, &str); 3] = [
 
 /// The fixes with their verdicts that hold `wanted`, in order of time.
 fn of(parts: Parts<'_>, wanted: impl Fn(&Judged) -> bool) -> Vec<(&Sample, &Judged)> {
-    let all = parts.fixes.iter().zip(&parts.dive.cleaned.judged);
+    let all = parts.dive.fixes.iter().zip(&parts.dive.judged);
     let mut found: Vec<_> = all.filter(|(_, judged)| wanted(judged)).collect();
     found.sort_by(|a, b| a.0.time_s.total_cmp(&b.0.time_s));
     found
@@ -179,19 +179,10 @@ fn numbers(parts: Parts<'_>) -> Table {
 
 fn exchanges(parts: Parts<'_>) -> Table {
     let report = parts.report;
-    let (exchanges, [across, down]) = (&report.exchanges, report.track.noise_scale);
+    let (exchanges, [across, down]) = (&report.exchanges, report.track.noise_m);
     let row = |what: &str, value: String| vec![what.to_owned(), value];
     let per_exchange = report.source.positions as f64 / exchanges.count.max(1) as f64;
-    let stated = report.source.position_sigma_m;
-    let noise = |scale: f64| match stated {
-        Some(sigma) => format!(
-            "{} m, {} times the {} m below",
-            value(sigma * scale, 2),
-            value(scale, 2),
-            value(sigma, 2)
-        ),
-        None => format!("{} times what the messages state", value(scale, 2)),
-    };
+    let noise = |sigma_m: f64| format!("{} m", value(sigma_m, 2));
     let mut rows = vec![
         row("exchanges", exchanges.count.to_string()),
         row("thrown out as a whole", exchanges.thrown_out.to_string()),

@@ -12,7 +12,7 @@ use super::{Page, Part, Section};
 use crate::fusion::usbl::Dive;
 use crate::report::UsblReport;
 use crate::report::text::short;
-use crate::sample::{Sample, Source};
+use crate::sample::Source;
 use crate::time::Time;
 
 /// What the page is made of.
@@ -22,8 +22,6 @@ pub struct Parts<'a> {
     pub report: &'a UsblReport,
     /// The tracks and what became of the fixes.
     pub dive: &'a Dive,
-    /// The fixes as they were read.
-    pub fixes: &'a [Sample],
     /// The instant that fixes count from.
     pub origin: Time,
     /// T0, from which the page's times count.

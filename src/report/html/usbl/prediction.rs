@@ -34,7 +34,7 @@ impl Error {
 pub(super) fn errors(parts: Parts<'_>) -> Vec<Error> {
     let Parts { dive, origin, .. } = parts;
     let error = |point: &TrackPoint| {
-        let track = dive.cleaned.at(point.time.seconds_since(origin))?;
+        let track = dive.at(point.time.seconds_since(origin))?;
         let off_m = std::array::from_fn(|i| point.state.position[i] - track.position[i]);
         Some(Error { point: *point, off_m })
     };

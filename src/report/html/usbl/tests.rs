@@ -6,6 +6,7 @@ use crate::estimate::usbl::Settings;
 use crate::fusion::usbl::{Causal, DivePlan, clean};
 use crate::report::UsblParts;
 use crate::report::html::{Plot, Style, Table};
+use crate::sample::Sample;
 use crate::source::{Loaded, SigmaOrigin, Timing};
 
 /// An hour's third at 1 m/s, an exchange of three fixes every 20 s; one fix of every fifth exchange is 300 m off, the
@@ -32,7 +33,7 @@ fn report_of(dive: &Dive, fixes: &Source, plan: &DivePlan, t0: Time) -> UsblRepo
         frame_id: plan.frame_id.clone(),
         fix_origin: None,
         timing: Timing { clock: "stamp".into(), delay_s: 0.0, delay_spread_s: 0.0, delay_growth_s: 0.0 },
-        late: Vec::new(),
+        arrival: Vec::new(),
         sigma: [Some((1.5, SigmaOrigin::Config)), None],
         notes: Vec::new(),
         warnings: Vec::new(),
@@ -55,18 +56,23 @@ fn report_of(dive: &Dive, fixes: &Source, plan: &DivePlan, t0: Time) -> UsblRepo
 fn page_of(causal: Causal) -> Page {
     let fixes = Source { name: "usbl".into(), positions: fixes(), velocities: Vec::new() };
     let origin = Time::from_ns(0);
+    // the 31st comes after the one that follows it
+    let mut arrival: Vec<u32> = (0..).take(fixes.positions.len()).collect();
+    arrival.swap(30, 31);
     let plan = DivePlan {
         origin,
         frame_id: "enu".into(),
         rate_hz: 1.0,
+        bridge_max_s: 1800.0,
         settings: Settings::default(),
         cycle_s: None,
         causal,
+        sigma_is_guess: false,
     };
-    let dive = clean(&fixes, &[30], &[], &plan).expect("a track");
+    let dive = clean(&fixes, &arrival, &[], &plan).expect("a track");
     let t0 = dive.fusion.track.points[0].time;
     let report = report_of(&dive, &fixes, &plan, t0);
-    page(Parts { report: &report, dive: &dive, fixes: &fixes.positions, origin, t0 }, &[], "")
+    page(Parts { report: &report, dive: &dive, origin, t0 }, &[], "")
 }
 
 fn plots(page: &Page) -> Vec<&Plot> {
