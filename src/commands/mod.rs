@@ -139,10 +139,7 @@ impl CommandError {
             Self::Source(error) => error.hint(),
             Self::Resolve(error) => Some(error.hint()),
             Self::Export(error) => Some(error.hint()),
-            Self::Estimate(EstimateError::TooFewSamples { what, .. }) if what == "usbl" => Some(
-                "a track needs four fixes in three acoustic exchanges; `fix` in `[usbl]` names another topic"
-                    .into(),
-            ),
+            Self::Estimate(error) => error.hint(),
             Self::File { .. } => {
                 Some("a scenario is a TOML file, such as `sample_logs/steep_climb.scenario.toml`".into())
             }

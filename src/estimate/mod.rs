@@ -101,6 +101,41 @@ pub enum EstimateError {
         /// What is missing.
         why: &'static str,
     },
+    /// USBL fixes that a depth sensor speaks against, so that none or too few are left.
+    #[error("{off} of {of} fixes are not at the depth sensor's depth (median: {})", usbl::beside(*median_m))]
+    OffDepth {
+        /// How many are elsewhere.
+        off: usize,
+        /// Of how many that have a depth beside them.
+        of: usize,
+        /// How far those are above the depth sensor's depth in the median, m.
+        median_m: f64,
+    },
+    /// USBL fixes that all say one of a few positions again.
+    #[error("{held} of {of} fixes only repeat the position before them: too few are left")]
+    Held {
+        /// How many.
+        held: usize,
+        /// Of how many.
+        of: usize,
+    },
+}
+
+impl EstimateError {
+    /// What to do about it.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        match self {
+            Self::OffDepth { .. } => Some("check sign, unit and zero of `usbl.depth`".into()),
+            Self::Held { .. } => {
+                Some("a system may say its last fix again while it hears nothing: look for a channel without these".into())
+            }
+            Self::TooFewSamples { what, .. } if what == "usbl" => Some(
+                "a track needs four fixes in three acoustic exchanges; `fix` in `[usbl]` names another topic".into(),
+            ),
+            _ => None,
+        }
+    }
 }
 
 /// Numbers beyond this overflow when they are squared a few times: no measurement is that large.
@@ -114,21 +149,22 @@ const LARGEST: f64 = 1e60;
 pub fn check(sources: &[Source]) -> Result<(), EstimateError> {
     for source in sources {
         for quantity in Quantity::ALL {
-            let good = |s: &Sample| {
-                let usable = |v: &f64| v.abs() <= LARGEST;
-                let sane = |v: &f64| (LARGEST.recip()..=LARGEST).contains(v);
-                s.value.iter().all(usable) && s.sigma.iter().all(sane) && usable(&s.time_s)
-            };
-            if let Some(sample) = source.series(quantity).iter().find(|s| !good(s)) {
-                return Err(bad_number(source, quantity, sample));
-            }
+            source.series(quantity).iter().try_for_each(|s| check_sample(&source.name, quantity, s))?;
         }
     }
     Ok(())
 }
 
+/// Refuses a sample: see [`check()`].
+fn check_sample(source: &str, quantity: Quantity, sample: &Sample) -> Result<(), EstimateError> {
+    let usable = |v: &f64| v.abs() <= LARGEST;
+    let sane = |v: &f64| (LARGEST.recip()..=LARGEST).contains(v);
+    let good = sample.value.iter().all(usable) && sample.sigma.iter().all(sane) && usable(&sample.time_s);
+    if good { Ok(()) } else { Err(bad_number(source, quantity, sample)) }
+}
+
 /// What is wrong with a sample that [`check()`] found.
-fn bad_number(source: &Source, quantity: Quantity, sample: &Sample) -> EstimateError {
+fn bad_number(source: &str, quantity: Quantity, sample: &Sample) -> EstimateError {
     let value = sample.value.iter().find(|v| !(-LARGEST..=LARGEST).contains(*v));
     let sigma = sample.sigma.iter().find(|v| !(LARGEST.recip()..=LARGEST).contains(v));
     let (value, expected) = match (value, sigma) {
@@ -136,6 +172,6 @@ fn bad_number(source: &Source, quantity: Quantity, sample: &Sample) -> EstimateE
         (None, Some(&v)) => (v, "a positive sigma"),
         (None, None) => (sample.time_s, "a finite time"),
     };
-    let what = format!("{} of {}", quantity.name(), source.name);
+    let what = format!("{} of {source}", quantity.name());
     EstimateError::BadNumber { what, time_s: sample.time_s, value, expected }
 }

@@ -7,7 +7,7 @@ use super::cycles::MOST_FIXES;
 use crate::sample::Sample;
 
 /// Two fixes agree whose squared distance over its variance is below this: 0.1 % of good pairs are farther apart.
-const AGREE: f64 = 16.0;
+pub(super) const AGREE: f64 = 16.0;
 
 /// Wild vectors spread over this many e-foldings of length.
 const WILD_FOLDINGS: f64 = 5.0;

@@ -2,15 +2,15 @@
 
 use super::candidates::{Candidate, Exchange, WildShares, exchanges};
 use super::dive::Dive;
-use super::judging::Judging;
+use super::judging::{Judging, LeftOut};
 use super::search::{Motion, search};
 use super::switches::Switches;
 use super::verdict::{Judged, Warning};
-use super::warnings::warnings;
+use super::warnings::{Evidence, warnings};
 use super::wiener::{Knowledge, Wiener};
 use super::{Height, cycles, liveliness};
-use crate::estimate::{EstimateError, check};
-use crate::sample::{Sample, Source};
+use crate::estimate::{EstimateError, check_sample};
+use crate::sample::{Quantity, Sample};
 use crate::track::{Curve, State};
 
 /// What may be chosen.
@@ -88,11 +88,14 @@ impl Curve for Cleaned {
 ///
 /// # Errors
 /// [`EstimateError::BadNumber`] for a value that is not finite or a sigma that is not positive,
-/// [`EstimateError::TooFewSamples`] below four fixes in three exchanges, [`EstimateError::Undetermined`] where too few
-/// fixes agree with each other.
+/// [`EstimateError::TooFewSamples`] below four fixes in three exchanges, [`EstimateError::OffDepth`] and
+/// [`EstimateError::Held`] where it is for the depth sensor or for repeated positions,
+/// [`EstimateError::Undetermined`] where too few fixes agree with each other.
 pub fn clean(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Result<Cleaned, EstimateError> {
     checked(fixes, heights)?;
-    let mut judging = Judging::new(fixes, heights, settings);
+    let mut heights = heights.to_vec();
+    heights.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    let mut judging = Judging::new(fixes, &heights, settings);
     let usable: Vec<Sample> = judging.usable.iter().map(|&i| fixes[i]).collect();
     let times: Vec<f64> = usable.iter().map(|f| f.time_s).collect();
     let gap_s =
@@ -100,7 +103,7 @@ pub fn clean(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Resul
     let groups = cycles::group(&times, gap_s);
     for (needed, got) in [(MIN_FIXES, usable.len()), (MIN_CYCLES, groups.len())] {
         if got < needed {
-            return Err(EstimateError::TooFewSamples { what: "usbl".into(), needed, got });
+            return Err(too_few(needed, got, fixes.len(), &judging.left_out));
         }
     }
     let mut first_scale = cycles::first_noise_scale(&usable, &groups);
@@ -139,16 +142,18 @@ pub fn clean(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Resul
     let first = search(&found, &candidates, PRIOR_WILD, motion([density; 2]));
 
     // what it says of noise, motion and wild shares, then a second one that knows
-    let dive = Dive::new(scaled([first_scale; 2]), found, candidates, heights);
+    let dive = Dive::new(scaled([first_scale; 2]), found, candidates, &heights);
     let mut switches = Switches::new(&dive, &first.chosen, PRIOR_WILD);
+    drop(first);
     let mut fit = Fit { scale: [1.0; 2], density: [density; 2], speed_m_s: 0.5 * settings.speed_limit_m_s };
     fit.settle(&dive, &switches, FIRST_STEPS)?;
     let wild = switches.shares(PRIOR_WILD, PRIOR_WORTH);
     let scale = fit.scale.map(|s| s * first_scale);
+    drop(dive); // a second one beside it would be the most memory that is ever needed
     let scaled_fixes = scaled(scale);
     let (found, candidates) = exchanges(&scaled_fixes, &groups, wild, within_m_s);
     let second = search(&found, &candidates, wild, motion(fit.density));
-    let dive = Dive::new(scaled_fixes, found, candidates, heights);
+    let dive = Dive::new(scaled_fixes, found, candidates, &heights);
     switches = Switches::new(&dive, &second.chosen, wild);
     fit.scale = [1.0; 2];
 
@@ -173,7 +178,16 @@ pub fn clean(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Resul
     }
     let scale = [scale[0] * fit.scale[0], scale[1] * fit.scale[1]];
     judging.judge(&dive, &switches, &track, fit.scale);
-    let warnings = warnings(&dive, &switches, &track, &second.disputes, scale);
+    let warnings = warnings(&Evidence {
+        dive: &dive,
+        switches: &switches,
+        track: &track,
+        disputes: &second.disputes,
+        judging: &judging,
+        fit_scale: fit.scale,
+        noise_scale: scale,
+        speed_limit_m_s: settings.speed_limit_m_s,
+    });
     Ok(Cleaned {
         track,
         judged: judging.judged,
@@ -186,9 +200,21 @@ pub fn clean(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Resul
 }
 
 fn checked(fixes: &[Sample], heights: &[Height]) -> Result<(), EstimateError> {
-    let depths = |h: &Height| Sample { time_s: h.time_s, value: [0.0, 0.0, h.z_m], sigma: [h.sigma_m; 3] };
-    let source = |name: &str, positions| Source { name: name.into(), positions, velocities: Vec::new() };
-    check(&[source("the fixes", fixes.to_vec()), source("the depth", heights.iter().map(depths).collect())])
+    let depth = |h: &Height| Sample { time_s: h.time_s, value: [0.0, 0.0, h.z_m], sigma: [h.sigma_m; 3] };
+    fixes.iter().try_for_each(|fix| check_sample("the fixes", Quantity::Position, fix))?;
+    heights.iter().try_for_each(|h| check_sample("the depth", Quantity::Position, &depth(h)))
+}
+
+/// Why so few fixes can't carry a track: what most of the others are.
+fn too_few(needed: usize, got: usize, of: usize, left_out: &LeftOut) -> EstimateError {
+    let LeftOut { held, with_depth, off_depth, off_m } = *left_out;
+    if off_depth > got.max(held) {
+        EstimateError::OffDepth { off: off_depth, of: with_depth, median_m: off_m }
+    } else if held > got {
+        EstimateError::Held { held, of }
+    } else {
+        EstimateError::TooFewSamples { what: "usbl".into(), needed, got }
+    }
 }
 
 /// What the smoother has found of motion and noise.

@@ -71,10 +71,11 @@ pub fn group(times_s: &[f64], gap_s: f64) -> Vec<Range<usize>> {
     groups
 }
 
-/// The usual time from one exchange to the next, s; `None` of fewer than two.
+/// The usual time from one exchange to the next, s, which is positive: `None` of fewer than two times. Exchanges of one
+/// instant, which are one of too many fixes, don't count.
 #[must_use]
 pub fn cycle_time_s(means_s: &[f64]) -> Option<f64> {
-    let mut gaps: Vec<f64> = means_s.windows(2).map(|w| w[1] - w[0]).collect();
+    let mut gaps: Vec<f64> = means_s.windows(2).map(|w| w[1] - w[0]).filter(|gap| *gap > 0.0).collect();
     robust::median(&mut gaps)
 }
 
@@ -85,14 +86,8 @@ pub fn cycle_time_s(means_s: &[f64]) -> Option<f64> {
 #[must_use]
 pub(super) fn first_noise_scale(fixes: &[Sample], groups: &[Range<usize>]) -> f64 {
     const CLEAR: f64 = 2.0;
-    let square = |w: &[Sample]| {
-        (0..3)
-            .map(|a| {
-                (w[1].value[a] - w[0].value[a]).powi(2) / (w[0].sigma[a].powi(2) + w[1].sigma[a].powi(2))
-            })
-            .sum()
-    };
-    let scale = nearest_quarter(pairs(fixes, groups).map(square).collect()).unwrap_or(1.0);
+    let scale = nearest_quarter(pairs(fixes, groups).map(|pair| pair_square(&pair[0], &pair[1])).collect())
+        .unwrap_or(1.0);
     if (CLEAR.recip()..=CLEAR).contains(&scale) { 1.0 } else { scale.max(1e-3) }
 }
 
@@ -106,6 +101,34 @@ pub fn guessed_sigma_m(fixes: &[Sample]) -> Option<f64> {
     let differ = pairs(fixes, &groups).filter(|w| w[0].value != w[1].value);
     let square = |w: &[Sample]| (0..3).map(|a| (w[1].value[a] - w[0].value[a]).powi(2)).sum::<f64>() / 2.0;
     nearest_quarter(differ.map(square).collect()).filter(|sigma_m| *sigma_m > 0.0)
+}
+
+/// The noise's standard deviation over that of `fixes` by the nearest pairs of one exchange: what half of the fixes may be
+/// wild for, and what all of an exchange have in common doesn't show in. `None` where there are too few pairs.
+pub(super) fn noise_scale_within(
+    fixes: &[Sample],
+    groups: impl Iterator<Item = Range<usize>>,
+) -> Option<f64> {
+    /// The nearest tenth of the pairs, and that quantile of a chi-square variable of three degrees of freedom.
+    const NEAREST: f64 = 0.1;
+    const QUANTILE: f64 = 0.584_374_374;
+    const FEWEST: usize = 20;
+    /// Fixes further on than this one are no other pairs than those before.
+    const FARTHEST: usize = 3;
+    let pairs = groups.flat_map(|group| {
+        let end = group.end;
+        group.flat_map(move |i| (i + 1..end.min(i + 1 + FARTHEST)).map(move |j| (i, j)))
+    });
+    let mut squares: Vec<f64> = pairs.map(|(i, j)| pair_square(&fixes[i], &fixes[j])).collect();
+    let nearest = robust::quantile(&mut squares, NEAREST).filter(|q| squares.len() >= FEWEST && *q > 0.0)?;
+    Some((nearest / QUANTILE).sqrt())
+}
+
+/// The squared distance of two fixes over its variance.
+fn pair_square(a: &Sample, b: &Sample) -> f64 {
+    (0..3)
+        .map(|axis| (b.value[axis] - a.value[axis]).powi(2) / (a.sigma[axis].powi(2) + b.sigma[axis].powi(2)))
+        .sum()
 }
 
 /// Fixes that follow each other in one exchange.
@@ -200,6 +223,7 @@ mod tests {
     #[test]
     fn the_cycle_time_is_the_usual_one() {
         assert_eq!(cycle_time_s(&[0.0, 20.0, 40.0, 280.0, 300.0]), Some(20.0));
-        assert_eq!(cycle_time_s(&[1.0]), None);
+        assert_eq!(cycle_time_s(&[0.0, 0.0, 0.0, 20.0, 20.0, 20.0, 40.0]), Some(20.0));
+        assert_eq!((cycle_time_s(&[1.0]), cycle_time_s(&[1.0, 1.0])), (None, None));
     }
 }

@@ -18,37 +18,47 @@ pub(super) struct Dive {
 }
 
 impl Dive {
+    /// `heights` in order of time.
     pub(super) fn new(
         fixes: Vec<Sample>,
         exchanges: Vec<Exchange>,
         candidates: Vec<Candidate>,
         heights: &[Height],
     ) -> Self {
-        let mut sorted = heights.to_vec();
-        sorted.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
         let centres: Vec<f64> = exchanges.iter().map(|e| e.time_s).collect();
-        let usual_s = cycles::cycle_time_s(&centres).unwrap_or(1.0);
+        let usual_s = cycles::cycle_time_s(&centres).unwrap_or(1.0).max(cycles::LEAST_GAP_S);
         let (mut nodes_s, mut node_of): (Vec<f64>, Vec<usize>) = (Vec::new(), Vec::new());
         for time_s in centres {
             if let Some(&last) = nodes_s.last() {
-                let between = ((time_s - last) / usual_s) as usize;
-                for k in 1..between {
-                    let t = last + (time_s - last) * k as f64 / between as f64;
-                    if height_at(&sorted, t).is_some() {
-                        nodes_s.push(t);
-                    }
-                }
+                between(last, time_s, usual_s, heights, &mut nodes_s);
             }
             let after = nodes_s.last().map_or(f64::NEG_INFINITY, |last| last + 0.05 * cycles::LEAST_GAP_S);
             node_of.push(nodes_s.len());
             nodes_s.push(time_s.max(after));
         }
-        let heights = nodes_s.iter().map(|&t| height_at(&sorted, t)).collect();
+        let heights = nodes_s.iter().map(|&t| height_at(heights, t)).collect();
         Self { fixes, exchanges, candidates, nodes_s, node_of, heights }
     }
 }
 
+/// Adds nodes at the times of heights between two nodes, `usual_s` apart: no more than there are heights, however long
+/// the silence is.
+fn between(last_s: f64, next_s: f64, usual_s: f64, heights: &[Height], nodes_s: &mut Vec<f64>) {
+    if next_s - last_s < 2.0 * usual_s {
+        return;
+    }
+    let mut due_s = last_s + usual_s;
+    let from = heights.partition_point(|h| h.time_s < due_s);
+    for height in heights[from..].iter().take_while(|h| h.time_s < next_s - 0.5 * usual_s) {
+        if height.time_s >= due_s {
+            nodes_s.push(height.time_s);
+            due_s = height.time_s + usual_s;
+        }
+    }
+}
+
 /// What the depth sensor says at an instant: height and its sigma, between two samples that are close.
+/// `sorted` is in order of time.
 pub(super) fn height_at(sorted: &[Height], time_s: f64) -> Option<(f64, f64)> {
     let after = sorted.partition_point(|h| h.time_s < time_s);
     let next = sorted.get(after)?;

@@ -5,20 +5,34 @@ use super::switches::Switches;
 use super::verdict::{Judged, Reason, Verdict};
 use super::wiener::Wiener;
 use super::{Height, Settings, cycles, in_order};
+use crate::math::robust;
 use crate::sample::Sample;
 
 /// The verdicts while they are made.
-pub(super) struct Judging {
+pub(super) struct Judging<'a> {
     pub(super) judged: Vec<Judged>,
     /// Indices of the fixes that are neither repeated nor off in depth, in order of time.
     pub(super) usable: Vec<usize>,
-    fixes: Vec<Sample>,
+    /// How many are left out, and why.
+    pub(super) left_out: LeftOut,
+    fixes: &'a [Sample],
 }
 
-impl Judging {
-    pub(super) fn new(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Self {
-        let mut sorted = heights.to_vec();
-        sorted.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+/// Fixes that are out before there is any track.
+#[derive(Clone, Copy, Default)]
+pub(super) struct LeftOut {
+    /// How many have the position of the one before them at another time.
+    pub(super) held: usize,
+    /// How many have a height of the depth sensor beside them, how many of these are off, and by how much in the median,
+    /// m, above it positive.
+    pub(super) with_depth: usize,
+    pub(super) off_depth: usize,
+    pub(super) off_m: f64,
+}
+
+impl<'a> Judging<'a> {
+    /// `heights` in order of time.
+    pub(super) fn new(fixes: &'a [Sample], heights: &[Height], settings: &Settings) -> Self {
         let unjudged = Judged {
             verdict: Verdict::Kept,
             reason: Reason::Fits,
@@ -34,23 +48,34 @@ impl Judging {
             newest = newest.max(fix.time_s);
         }
         let mut usable: Vec<usize> = Vec::with_capacity(fixes.len());
+        let mut left_out = LeftOut::default();
+        let mut off_m = Vec::new();
+        let mut before: Option<&Sample> = None;
         for i in in_order(fixes) {
             let fix = &fixes[i];
             let same_time = usable.iter().rev().take_while(|&&j| fixes[j].time_s >= fix.time_s);
-            if same_time.take(cycles::MOST_FIXES).any(|&j| fixes[j].value == fix.value) {
+            let again = same_time.take(cycles::MOST_FIXES).any(|&j| fixes[j].value == fix.value);
+            // noise never gives three equal numbers twice: a system that hears nothing says its last fix again
+            let held = before.replace(fix).filter(|before| before.value == fix.value);
+            if again || held.is_some() {
                 (judged[i].verdict, judged[i].reason) = (Verdict::Duplicate, Reason::Repeated);
+                left_out.held += usize::from(held.is_some_and(|before| before.time_s < fix.time_s));
                 continue;
             }
-            let off = height_at(&sorted, fix.time_s).is_some_and(|(z_m, sigma_m)| {
-                (fix.value[2] - z_m).abs() > settings.depth_gate_sigmas * fix.sigma[2].hypot(sigma_m)
-            });
-            if off {
-                (judged[i].verdict, judged[i].reason) = (Verdict::Wild, Reason::OffDepth);
-                continue;
+            if let Some((z_m, sigma_m)) = height_at(heights, fix.time_s) {
+                left_out.with_depth += 1;
+                let above_m = fix.value[2] - z_m;
+                if above_m.abs() > settings.depth_gate_sigmas * fix.sigma[2].hypot(sigma_m) {
+                    off_m.push(above_m);
+                    (judged[i].verdict, judged[i].reason) = (Verdict::Wild, Reason::OffDepth);
+                    continue;
+                }
             }
             usable.push(i);
         }
-        Self { judged, usable, fixes: fixes.to_vec() }
+        left_out.off_depth = off_m.len();
+        left_out.off_m = robust::median(&mut off_m).unwrap_or(0.0);
+        Self { judged, usable, left_out, fixes }
     }
 
     pub(super) fn judge(&mut self, dive: &Dive, switches: &Switches, track: &Wiener, scale: [f64; 2]) {

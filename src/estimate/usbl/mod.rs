@@ -63,6 +63,7 @@ pub mod cycles;
 pub mod geometry;
 pub mod ship;
 
+mod another;
 mod candidates;
 mod clean;
 mod dive;
@@ -75,6 +76,7 @@ mod warnings;
 mod wiener;
 
 pub use clean::{Cleaned, Settings, clean};
+pub(crate) use verdict::beside;
 pub use verdict::{Judged, Reason, Verdict, Warning};
 
 use crate::sample::Sample;

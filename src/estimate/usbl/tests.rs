@@ -1,3 +1,5 @@
+mod warnings;
+
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -150,6 +152,55 @@ fn duplicates_are_flagged_once_and_late_messages_change_nothing() {
     assert!(again.judged[360].late && again.judged[44].late && !again.judged[45].late);
     assert_eq!(again.judged.iter().filter(|j| j.verdict == Verdict::Duplicate).count(), 1);
     assert_eq!(track.at(777.0), again.at(777.0));
+}
+
+#[test]
+fn positions_that_a_system_holds_are_taken_once() {
+    let given = fixes(|_, k| if k == 3 { [0.0, 0.0, 80.0] } else { [0.0; 3] });
+    let again = given.iter().flat_map(|f| [0.0, 0.1, 0.2].map(|s| Sample { time_s: f.time_s + s, ..*f }));
+    // the last one is held until the next exchange
+    let held: Vec<Sample> = again
+        .chain(
+            given
+                .iter()
+                .skip(3)
+                .step_by(4)
+                .flat_map(|f| (1..17).map(|s| Sample { time_s: f.time_s + f64::from(s), ..*f })),
+        )
+        .collect();
+    let (track, once) = (cleaned(&held), cleaned(&given));
+    let repeated = track.judged.iter().filter(|j| j.reason == Reason::Repeated).count();
+    assert_eq!(repeated, held.len() - given.len());
+    assert_eq!(track.at(777.0), once.at(777.0));
+    let told = Warning::Held { held: repeated, of: held.len() };
+    assert!(
+        track.warnings.contains(&told) && !once.warnings.iter().any(|w| matches!(w, Warning::Held { .. }))
+    );
+    let one: Vec<Sample> = given.iter().map(|f| Sample { value: given[0].value, ..*f }).collect();
+    let error = clean(&one, &[], &Settings::default()).expect_err("nothing moves");
+    assert_eq!(error, EstimateError::Held { held: 359, of: 360 });
+}
+
+#[test]
+fn bursts_of_one_instant_and_long_silences_come_to_an_end() {
+    let at = |i: usize| 20.0 * i as f64 + if i > 30 { 1e6 } else { 0.0 };
+    let burst = |i: usize| {
+        let value = truth(20.0 * i as f64);
+        (0..64).map(move |k| Sample {
+            time_s: at(i),
+            value: value.map(|v| v + f64::from(k % 7)),
+            sigma: [3.0; 3],
+        })
+    };
+    let given: Vec<Sample> = (0..60).flat_map(burst).collect();
+    let heights: Vec<Height> = (0..60)
+        .map(|i| Height { time_s: at(i), z_m: truth(20.0 * i as f64)[2] + 3.0, sigma_m: 1.0 })
+        .collect();
+    for heights in [&heights[..], &[]] {
+        let state =
+            clean(&given, heights, &Settings::default()).expect("a track").at(400.0).expect("a state");
+        assert!((0..3).all(|a| (state.position[a] - truth(400.0)[a] - 3.0).abs() < 2.0), "{state:?}");
+    }
 }
 
 #[test]

@@ -27,7 +27,7 @@ pub enum Reason {
     OffAsCycle,
     /// Its height is not that of the depth sensor.
     OffDepth,
-    /// It has the time and the position of an earlier one.
+    /// It has the position of the one before it, or that of another one of its time.
     Repeated,
     /// It and the few about it stand alone in time, too few for a track.
     Stray,
@@ -103,8 +103,9 @@ pub enum Warning {
     },
     /// For a while hardly any exchange was believed: those that were may be the wrong ones.
     #[error(
-        "from {from_s:.0} s to {to_s:.0} s {rejected} of {of} exchanges were thrown out: the track may be wrong there by more \
-         than its bands"
+        "from {} s to {} s {rejected} of {of} exchanges were thrown out: the track may be wrong there by more than its bands",
+        whole(*from_s),
+        whole(*to_s)
     )]
     WildStretch {
         /// Where it begins, s.
@@ -118,7 +119,9 @@ pub enum Warning {
     },
     /// Another track explains the fixes nearly as well.
     #[error(
-        "from {from_s:.0} s to {to_s:.0} s the fixes allow another track, up to {apart_m:.0} m off (odds {odds:.2})"
+        "from {} s to {} s the fixes allow another track, up to {apart_m:.0} m off (odds {odds:.2})",
+        whole(*from_s),
+        whole(*to_s)
     )]
     Ambiguous {
         /// Where the other one leaves this one, s.
@@ -129,6 +132,76 @@ pub enum Warning {
         apart_m: f64,
         /// How likely the other one is beside this one.
         odds: f64,
+    },
+    /// So many fixes were thrown out that those left over may be the wrong ones.
+    #[error("{rejected} of {of} fixes were thrown out: the track may follow the wrong ones")]
+    ManyWildFixes {
+        /// How many were thrown out.
+        rejected: usize,
+        /// Of how many.
+        of: usize,
+    },
+    /// Fixes that were thrown out agree with each other.
+    #[error(
+        "{alike} of {of} fixes that were thrown out are off like the one before them, by {off_m:.0} m: is there another \
+         vehicle or transponder among the fixes, or a reflection?"
+    )]
+    AnotherTrack {
+        /// How many are off like the one before them.
+        alike: usize,
+        /// Of how many that are off by enough to tell.
+        of: usize,
+        /// How far those are off in the median, m.
+        off_m: f64,
+    },
+    /// Most fixes that have a depth beside them are elsewhere.
+    #[error(
+        "{off} of {of} fixes were thrown out because they are not at the depth sensor's depth (median: {}): check sign, \
+         unit and zero of `usbl.depth`",
+        beside(*median_m)
+    )]
+    OffDepth {
+        /// How many are elsewhere.
+        off: usize,
+        /// Of how many that have a depth beside them.
+        of: usize,
+        /// How far those are above the depth sensor's depth in the median, m.
+        median_m: f64,
+    },
+    /// Fixes that only say the last one again.
+    #[error(
+        "{held} of {of} fixes repeat the position before them, which the track takes once: a system may do so while it \
+             hears nothing"
+    )]
+    Held {
+        /// How many.
+        held: usize,
+        /// Of how many.
+        of: usize,
+    },
+    /// The vehicle is faster than it should be.
+    #[error(
+        "the track is faster than `usbl.speed_limit_m_s` = {limit_m_s} at {exchanges} of {of} exchanges, up to \
+         {speed_m_s:.1} m/s: where the vehicle is, set it higher"
+    )]
+    Fast {
+        /// At how many exchanges.
+        exchanges: usize,
+        /// Of how many that are believed.
+        of: usize,
+        /// The highest speed at one of them, m/s.
+        speed_m_s: f64,
+        /// The limit, m/s.
+        limit_m_s: f64,
+    },
+    /// Fixes of one exchange lie closer together than the noise that was found has it.
+    #[error(
+        "the noise is {factor:.1} times what the nearest fixes of one exchange tell: many fixes are wild, or all of an \
+         exchange are off together, and the bands may be wrong"
+    )]
+    NoiseWithin {
+        /// Standard deviation over that of the nearest fixes of one exchange.
+        factor: f64,
     },
     /// Some fixes stand alone in time.
     #[error(
@@ -163,6 +236,16 @@ pub enum Warning {
         /// Standard deviation over the stated one.
         scale: f64,
     },
+}
+
+/// Whole seconds, and never "-0".
+fn whole(time_s: f64) -> f64 {
+    time_s.round() + 0.0
+}
+
+/// "12 m above it", of a fix beside a depth sensor.
+pub(crate) fn beside(above_m: f64) -> String {
+    format!("{:.0} m {} it", above_m.abs(), if above_m < 0.0 { "below" } else { "above" })
 }
 
 impl Warning {

@@ -123,6 +123,48 @@ mod tests {
     }
 
     #[test]
+    fn the_papers_start_equals_batch_least_squares_with_its_prior() {
+        let large = 1e6_f64;
+        // a dive of an hour, t counting from its begin as in the paper
+        let points: Vec<_> = (0..180)
+            .map(|i| 20.0 * f64::from(i))
+            .map(|t| (t, [(0.002 * t).sin() * 90.0, 0.5 * t + (0.12 * t).cos(), -0.7 * t]))
+            .collect();
+        let first = points.first_chunk().expect("three");
+        let mut rls = Rls::start(first, 0.0, Some(large)).expect("different times");
+        let start = rls.x;
+        for &(t, z) in &points[3..] {
+            rls.update(t, z, 1.0, 1.0);
+        }
+        for axis in 0..3 {
+            let mut batch = LeastSquares::new(3);
+            let weight = large.sqrt().recip();
+            for k in 0..3 {
+                let mut prior = [0.0; 3];
+                prior[k] = weight;
+                batch.push(&prior, weight * start[(k, axis)]);
+            }
+            for (t, z) in &points[3..] {
+                batch.push(&[t * t, *t, 1.0], z[axis]);
+            }
+            let batch = batch.solve().expect("determined");
+            for t in [3600.0, 3780.0_f64] {
+                let h = [t * t, t, 1.0];
+                let expected: f64 = (0..3).map(|k| h[k] * batch.coefficients[k]).sum();
+                let found = rls.at(t).0[axis];
+                // millimetres are what the digits of a prior so large leave
+                assert!((found - expected).abs() < 2e-3, "{axis} {t}: {found} {expected}");
+                let variance = batch.variance_of(&h);
+                assert!(
+                    (rls.variance(t)[0] / variance - 1.0).abs() < 1e-2,
+                    "{axis} {t}: {:?} {variance}",
+                    rls.variance(t)
+                );
+            }
+        }
+    }
+
+    #[test]
     fn another_origin_of_time_changes_nothing_but_digits() {
         let points = points();
         let mut rls = Rls::start(points.first_chunk().expect("three"), 0.0, None).expect("different times");
