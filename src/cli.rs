@@ -215,9 +215,9 @@ Exit codes: 0 done; 1 failed, or no instant in common; 2 usage wrong, such as a 
 pub struct Compare {
     /// The log that holds both
     pub log: PathBuf,
-    /// Topic of the track
-    #[arg(long, value_name = "TOPIC", default_value = "/fused/track")]
-    pub estimate: String,
+    /// Topic of the track [default: /fused/track, else the log's only one]
+    #[arg(long, value_name = "TOPIC")]
+    pub estimate: Option<String>,
     /// Topic of the reference, or message paths of its position and of its velocity
     #[arg(long, value_name = "TOPIC", required = true)]
     pub reference: Vec<String>,
@@ -262,9 +262,9 @@ origin; 3 done, with warnings that a person must read, such as messages that can
 pub struct Export {
     /// The log to read
     pub log: PathBuf,
-    /// Topic of the track; a channel with a position will do too
-    #[arg(long, value_name = "TOPIC", default_value = "/fused/track")]
-    pub topic: String,
+    /// Topic of the track; a channel with a position will do too [default: /fused/track, else the log's only track]
+    #[arg(long, value_name = "TOPIC")]
+    pub topic: Option<String>,
     /// Format [default: what FILE's ending says, else csv]
     #[arg(long, value_enum)]
     pub format: Option<Format>,

@@ -18,7 +18,8 @@ use crate::source::{self, Loaded, Recorded, SigmaOrigin};
 pub fn compare(args: &Compare) -> Result<Outcome, CommandError> {
     let bar = Bar::new(args.voice);
     let (log, damage) = open(&args.log, args.memory, args.strict, &bar)?;
-    let mut estimate = source::recorded(&log, &args.estimate)?;
+    let topic = args.estimate.clone().unwrap_or_else(|| source::usual_track(&log));
+    let mut estimate = source::recorded(&log, &topic)?;
     estimate.warnings.splice(..0, damage);
     let (mut reference, reference_origin) =
         source::reference(&log, &args.reference, args.reference_time, estimate.fix_origin)?;
@@ -27,7 +28,7 @@ pub fn compare(args: &Compare) -> Result<Outcome, CommandError> {
     for quantity in Quantity::ALL {
         reference.source.series_mut(quantity).iter_mut().for_each(|s| s.time_s += shift_s);
     }
-    let (events, left_out) = source::recorded_events(&log, &args.estimate)?;
+    let (events, left_out) = source::recorded_events(&log, &topic)?;
     let mut heights: Vec<Height> =
         events.into_iter().map(|event| Height { name: event.name, z_m: event.position[2] }).collect();
     for height in &args.height {
@@ -47,12 +48,12 @@ pub fn compare(args: &Compare) -> Result<Outcome, CommandError> {
             reference: span(reference.source.span_s()),
         });
     }
-    let mut warnings = warnings(&args.estimate, &estimate, &reference, &comparison);
+    let mut warnings = warnings(&topic, &estimate, &reference, &comparison);
     warnings.splice(..0, left_out.into_iter().filter(|w| !warnings.contains(w)).collect::<Vec<_>>());
     drop(bar);
     let report = ComparisonReport::new(&ComparisonParts {
         log: &args.log.display().to_string(),
-        topic: &args.estimate,
+        topic: &topic,
         estimate: &estimate,
         reference: &reference,
         t0,

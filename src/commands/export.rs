@@ -100,19 +100,20 @@ pub fn export(args: &Export) -> Result<Outcome, CommandError> {
     if let Some(out) = &args.output {
         log.ensure_other(out)?;
     }
-    let mut recorded = source::recorded(&log, &args.topic)?;
+    let topic = args.topic.clone().unwrap_or_else(|| source::usual_track(&log));
+    let mut recorded = source::recorded(&log, &topic)?;
     recorded.warnings.splice(..0, damage);
     let map = match format {
-        Format::Geojson | Format::Kml => Some(map(args, format, &log, &mut recorded)?),
+        Format::Geojson | Format::Kml => Some(map(args, &topic, format, &log, &mut recorded)?),
         Format::Csv | Format::Parquet | Format::Tum => None,
     };
     drop(bar);
     if recorded.is_own && !recorded.has_phases {
         let what = "have no place for phase, method and acceleration";
-        note(args.voice, &format!("the messages of {} {what}", args.topic));
+        note(args.voice, &format!("the messages of {topic} {what}"));
     }
-    let written = Written { exported: Exported { topic: &args.topic, recorded: &recorded }, map, format };
-    let mut report = ExportReport::new(args.log.display().to_string(), &args.topic, name(format), &recorded);
+    let written = Written { exported: Exported { topic: &topic, recorded: &recorded }, map, format };
+    let mut report = ExportReport::new(args.log.display().to_string(), &topic, name(format), &recorded);
     if let Some(vertices) = written.map.as_ref().map(Map::vertices).filter(|v| *v < report.points) {
         note(args.voice, &format!("a map's lines are thinned: {vertices} of {} points", report.points));
     }
@@ -122,7 +123,7 @@ pub fn export(args: &Export) -> Result<Outcome, CommandError> {
             written.write(file).map_err(|source| LogError::Write { path: out.clone(), source })
         })?;
         let (points, format) = (report.points, name(format));
-        let text = format!("{} -> {} ({format}, {points} points, {len} bytes)", args.topic, out.display());
+        let text = format!("{topic} -> {} ({format}, {points} points, {len} bytes)", out.display());
         let mut text = printable(&text).into_owned() + "\n";
         text.extend(warnings.iter().map(|w| format!("warning: {}\n", printable(w))));
         report.output = Some(out.display().to_string());
@@ -172,22 +173,28 @@ fn check_output(args: &Export, format: Format) -> Result<(), ExportError> {
 }
 
 /// The track as a map shows it, with the characteristic points beside it.
-fn map(args: &Export, format: Format, log: &Log, recorded: &mut Recorded) -> Result<Map, CommandError> {
-    let (topic, format) = (args.topic.clone(), name(format));
+fn map(
+    args: &Export,
+    topic: &str,
+    format: Format,
+    log: &Log,
+    recorded: &mut Recorded,
+) -> Result<Map, CommandError> {
+    let (named, format) = (topic.to_owned(), name(format));
     let origin = match (recorded.fix_origin, args.origin) {
         (Some(known), Some(given)) if known != given => {
-            return Err(ExportError::OtherOrigin { topic, known, given }.into());
+            return Err(ExportError::OtherOrigin { topic: named, known, given }.into());
         }
-        (known, given) => known.or(given).ok_or(ExportError::NoOrigin { topic, format })?,
+        (known, given) => known.or(given).ok_or(ExportError::NoOrigin { topic: named, format })?,
     };
-    let (events, left_out) = if recorded.is_own && args.topic.ends_with("/track") {
-        source::recorded_events(log, &args.topic)?
+    let (events, left_out) = if recorded.is_own && topic.ends_with("/track") {
+        source::recorded_events(log, topic)?
     } else {
         Default::default()
     };
     let new: Vec<String> = left_out.into_iter().filter(|w| !recorded.warnings.contains(w)).collect();
     recorded.warnings.extend(new);
-    Ok(Map::new(Exported { topic: &args.topic, recorded }, &events, origin))
+    Ok(Map::new(Exported { topic, recorded }, &events, origin))
 }
 
 fn name(format: Format) -> &'static str {

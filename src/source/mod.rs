@@ -32,7 +32,7 @@ pub(crate) use load::DIFFERENT_EPOCHS_S;
 pub use load::{Loaded, Samples, SigmaOrigin, Timing, datum, load};
 pub use propose::{Proposal, propose, propose_chosen};
 pub use recognise::{Choice, Recognised, choices_of, recognise};
-pub use recorded::{Recorded, recorded, reference};
+pub use recorded::{Recorded, recorded, reference, usual_track};
 pub use topic::is_datum_like;
 pub use usbl::usbl_fix;
 

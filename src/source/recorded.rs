@@ -50,6 +50,21 @@ impl Recorded {
     }
 }
 
+/// The track that is meant where none is named: the fused one, else the only one that the log's metadata tell of.
+#[must_use]
+pub fn usual_track(log: &Log) -> String {
+    const FUSED: &str = "/fused/track";
+    let index = log.index();
+    let has = |topic: &str| index.channels_of(topic).next().is_some();
+    let prefixes = index.metadata.iter().filter_map(|m| m.name.strip_prefix("trackfuse:"));
+    let tracks: BTreeSet<String> =
+        prefixes.map(|prefix| format!("{prefix}/track")).filter(|t| has(t)).collect();
+    match tracks.first() {
+        Some(only) if tracks.len() == 1 && !has(FUSED) => only.clone(),
+        _ => FUSED.to_owned(),
+    }
+}
+
 /// Reads the track of a topic: one that this program wrote, or any position, with its velocity if there is one.
 ///
 /// # Errors

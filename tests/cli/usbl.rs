@@ -338,7 +338,7 @@ fn what_is_written_leads_back_compares_exports_and_is_never_fused_again() {
     ];
     let compared = trackfuse(trial.folder(), &args);
     assert_eq!(compared.code, 0, "{compared:#?}");
-    let exported = trackfuse(trial.folder(), &["export", "in.usbl.mcap", "--topic", "/usbl/track"]);
+    let exported = trackfuse(trial.folder(), &["export", "in.usbl.mcap"]);
     assert_eq!(exported.code, 0, "{exported:#?}");
     assert!(exported.stdout.lines().count() > 3000 && exported.stdout.contains(",bridged,usbl"));
     let again = trackfuse(trial.folder(), &["usbl", "in.usbl.mcap", "-o", "again.mcap"]);
