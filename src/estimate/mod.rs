@@ -82,7 +82,7 @@ pub enum EstimateError {
         got: usize,
     },
     /// A number that no estimator can use.
-    #[error("{what} at {time_s} s is {value}, expected {expected}")]
+    #[error("{what} at {time_s} s is {value:?}, expected {expected}")]
     BadNumber {
         /// The number's name, with its source.
         what: String,
