@@ -73,12 +73,13 @@ pub(super) fn square(a: [f64; 3]) -> f64 {
 }
 
 /// The exchanges with all their candidates. `speed_m_s` is what the vehicle does within one: fixes of different times
-/// may be so far apart.
+/// may be so far apart. `common_m2` is the variance of what an exchange's fixes have in common: horizontal, vertical.
 pub(super) fn exchanges(
     fixes: &[Sample],
     groups: &[Range<usize>],
     wild: WildShares,
     speed_m_s: f64,
+    common_m2: [f64; 2],
 ) -> (Vec<Exchange>, Vec<Candidate>) {
     let mut candidates = Vec::with_capacity(groups.len() * 2);
     let exchanges = groups
@@ -88,6 +89,9 @@ pub(super) fn exchanges(
             let time_s = own.iter().map(|f| f.time_s).sum::<f64>() / own.len() as f64;
             let from = candidates.len();
             of_exchange(own, time_s, wild, speed_m_s, &mut candidates);
+            for candidate in &mut candidates[from..] {
+                (0..3).for_each(|axis| candidate.variance[axis] += common_m2[axis / 2]);
+            }
             candidates[from..].sort_by(|a, b| b.log_inside.total_cmp(&a.log_inside));
             Exchange { fixes: group.clone(), time_s, candidates: from..candidates.len() }
         })

@@ -1,15 +1,17 @@
 //! The robust smoother, from fixes to a track, a verdict for each, and warnings.
 
 use super::candidates::{Candidate, Exchange, WildShares, exchanges};
+use super::common::{self, Common};
 use super::dive::Dive;
 use super::judging::{Judging, LeftOut};
 use super::search::{Motion, search};
-use super::switches::Switches;
+use super::switches::{Noise, Switches};
 use super::verdict::{Judged, Warning};
 use super::warnings::{Evidence, warnings};
 use super::wiener::{Knowledge, Wiener};
 use super::{Height, cycles, liveliness};
 use crate::estimate::{EstimateError, check_sample};
+use crate::math::robust;
 use crate::sample::{Quantity, Sample};
 use crate::track::{Curve, State};
 
@@ -69,6 +71,8 @@ pub struct Cleaned {
     pub wild_cycles: Vec<bool>,
     /// Standard deviation of the noise over what was stated: horizontal, vertical.
     pub noise_scale: [f64; 2],
+    /// Standard deviation of what the fixes of one exchange have in common, m, which is part of that: horizontal, vertical.
+    pub common_m: [f64; 2],
     /// Density of the acceleration over the whole dive, m^2/s^3: horizontal, vertical.
     pub acceleration_density: [f64; 2],
     /// What a person must know.
@@ -115,7 +119,8 @@ pub fn clean(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Resul
 
     // a first search with a density that suits the dive
     let within_m_s = 0.3 * settings.speed_limit_m_s;
-    let (mut found, mut candidates) = exchanges(&scaled([first_scale; 2]), &groups, PRIOR_WILD, within_m_s);
+    let (mut found, mut candidates) =
+        exchanges(&scaled([first_scale; 2]), &groups, PRIOR_WILD, within_m_s, [0.0; 2]);
     let motion = |density: [f64; 2]| Motion {
         density: [density[0], density[0], density[1]],
         speed_limit_m_s: settings.speed_limit_m_s,
@@ -133,7 +138,7 @@ pub fn clean(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Resul
     let (mut density, likelihood) = likeliest(&found, &candidates);
     if first_scale != 1.0 {
         // many wild fixes look like much noise: whichever explains more
-        let other = exchanges(&scaled([1.0; 2]), &groups, PRIOR_WILD, within_m_s);
+        let other = exchanges(&scaled([1.0; 2]), &groups, PRIOR_WILD, within_m_s, [0.0; 2]);
         let as_stated = likeliest(&other.0, &other.1);
         if as_stated.1 > likelihood {
             (found, candidates, density, first_scale) = (other.0, other.1, as_stated.0, 1.0);
@@ -145,22 +150,25 @@ pub fn clean(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Resul
     let dive = Dive::new(scaled([first_scale; 2]), found, candidates, &heights);
     let mut switches = Switches::new(&dive, &first.chosen, PRIOR_WILD);
     drop(first);
-    let mut fit = Fit { scale: [1.0; 2], density: [density; 2], speed_m_s: 0.5 * settings.speed_limit_m_s };
+    let usual_m2 = usual_m2(&dive.fixes);
+    // something in common to begin with: nothing would stay nothing
+    let noise = Noise { scale: [1.0; 2], common_m2: usual_m2.map(|m2| 0.25 * m2) };
+    let mut fit = Fit { noise, usual_m2, density: [density; 2], speed_m_s: 0.5 * settings.speed_limit_m_s };
     fit.settle(&dive, &switches, FIRST_STEPS)?;
     let wild = switches.shares(PRIOR_WILD, PRIOR_WORTH);
-    let scale = fit.scale.map(|s| s * first_scale);
+    let scale = fit.noise.scale.map(|s| s * first_scale);
     drop(dive); // a second one beside it would be the most memory that is ever needed
     let scaled_fixes = scaled(scale);
-    let (found, candidates) = exchanges(&scaled_fixes, &groups, wild, within_m_s);
+    let (found, candidates) = exchanges(&scaled_fixes, &groups, wild, within_m_s, fit.noise.common_m2);
     let second = search(&found, &candidates, wild, motion(fit.density));
     let dive = Dive::new(scaled_fixes, found, candidates, &heights);
     switches = Switches::new(&dive, &second.chosen, wild);
-    fit.scale = [1.0; 2];
+    fit.noise.scale = [1.0; 2];
 
     // every switch against the track without its exchange
     let mut track = fit.settle(&dive, &switches, FIRST_STEPS / 2)?;
     for _ in 0..ROUNDS {
-        if !switches.revise(&dive, &track, fit.scale) {
+        if !switches.revise(&dive, &track, fit.noise) {
             break;
         }
         track = fit.settle(&dive, &switches, 1)?;
@@ -170,21 +178,28 @@ pub fn clean(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Resul
         let densities = liveliness::densities(&track, &dive.nodes_s, &switches.heard(&dive), fit.density);
         track = fit.track(&dive, &switches, densities)?;
         if LIVELY_REVISED.contains(&step) {
-            switches.revise(&dive, &track, fit.scale);
+            switches.revise(&dive, &track, fit.noise);
         } else {
-            switches.revise_fixes(&dive, &track, fit.scale);
+            switches.revise_fixes(&dive, &track, fit.noise);
         }
-        fit.noise(&dive, &switches, &track);
+        fit.noisy(&dive, &switches, &track);
     }
-    let scale = [scale[0] * fit.scale[0], scale[1] * fit.scale[1]];
-    judging.judge(&dive, &switches, &track, fit.scale);
+    let within = [0, 1].map(|i| scale[i] * fit.noise.scale[i]);
+    let common_m = fit.noise.common_m2.map(f64::sqrt);
+    // a fix is off by both
+    let scale = [0, 1].map(|i| {
+        let own = within[i];
+        let stated_m2 = fit.usual_m2[i] / (first_scale * first_scale);
+        (own * own + fit.noise.common_m2[i] / stated_m2).sqrt()
+    });
+    judging.judge(&dive, &switches, &track, fit.noise);
     let warnings = warnings(&Evidence {
         dive: &dive,
         switches: &switches,
         track: &track,
         disputes: &second.disputes,
         judging: &judging,
-        fit_scale: fit.scale,
+        fit_scale: fit.noise.scale,
         noise_scale: scale,
         speed_limit_m_s: settings.speed_limit_m_s,
     });
@@ -194,6 +209,7 @@ pub fn clean(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Resul
         cycle_times_s: dive.exchanges.iter().map(|e| e.time_s).collect(),
         wild_cycles: switches.believed.iter().map(|b| !b).collect(),
         noise_scale: scale,
+        common_m,
         acceleration_density: fit.density,
         warnings,
     })
@@ -217,10 +233,19 @@ fn too_few(needed: usize, got: usize, of: usize, left_out: &LeftOut) -> Estimate
     }
 }
 
+/// The median variance of fixes, m^2: horizontal, vertical.
+fn usual_m2(fixes: &[Sample]) -> [f64; 2] {
+    [0, 2].map(|axis| {
+        let mut sigmas: Vec<f64> = fixes.iter().map(|f| f.sigma[axis]).collect();
+        robust::median(&mut sigmas).unwrap_or(1.0).powi(2)
+    })
+}
+
 /// What the smoother has found of motion and noise.
 struct Fit {
-    /// Standard deviation of the noise over that of the dive's fixes: horizontal, vertical.
-    scale: [f64; 2],
+    noise: Noise,
+    /// The median variance of the dive's fixes, m^2: horizontal, vertical.
+    usual_m2: [f64; 2],
     /// Horizontal, vertical.
     density: [f64; 2],
     speed_m_s: f64,
@@ -233,7 +258,7 @@ impl Fit {
         for step in 0.. {
             let [h, z] = self.density;
             let track = self.track(dive, switches, [h, h, z].map(|q| vec![q; intervals]))?;
-            self.noise(dive, switches, &track);
+            self.noisy(dive, switches, &track);
             if step == steps {
                 return Ok(track);
             }
@@ -250,14 +275,14 @@ impl Fit {
         density: [Vec<f64>; 3],
     ) -> Result<Wiener, EstimateError> {
         let mut knowledge = vec![[Knowledge::default(); 3]; dive.nodes_s.len()];
-        for (e, exchange) in dive.exchanges.iter().enumerate() {
-            let node = dive.node_of[e];
-            for i in exchange.fixes.clone().filter(|&i| switches.used[i]) {
-                let fix = &dive.fixes[i];
-                for axis in 0..3 {
-                    let weight = (fix.sigma[axis] * self.scale[axis / 2]).powi(-2);
-                    knowledge[node][axis].add(fix.value[axis], weight, fix.time_s - exchange.time_s);
-                }
+        for (e, &node) in dive.node_of.iter().enumerate() {
+            if !switches.believed[e] {
+                continue;
+            }
+            for axis in 0..3 {
+                let own = switches.knowledge(dive, e, axis, self.noise.scale);
+                let common = Common::of(&own, self.noise.common_m2[axis / 2]);
+                knowledge[node][axis].join(&common.taken_from(own));
             }
         }
         for (known, height) in knowledge.iter_mut().zip(&dive.heights) {
@@ -269,26 +294,32 @@ impl Fit {
     }
 
     /// The noise's scale from what is left of the fixes, the track's own share taken out.
-    fn noise(&mut self, dive: &Dive, switches: &Switches, track: &Wiener) {
+    fn noisy(&mut self, dive: &Dive, switches: &Switches, track: &Wiener) {
         /// What was stated is worth this many fixes.
         const WORTH: f64 = 5.0;
         let (mut squares, mut freedom) = ([WORTH; 2], [WORTH; 2]);
         for (e, exchange) in dive.exchanges.iter().enumerate() {
             let node = dive.node_of[e];
             for axis in 0..3 {
-                let ([p, v], [pp, pv, vv]) = track.node(axis, node);
+                let (state, covariance) = track.node(axis, node);
+                let own = switches.knowledge(dive, e, axis, self.noise.scale);
+                let common = Common::of(&own, self.noise.common_m2[axis / 2]);
                 for i in exchange.fixes.clone().filter(|&i| switches.used[i]) {
                     let fix = &dive.fixes[i];
                     let dt = fix.time_s - exchange.time_s;
                     let variance = fix.sigma[axis] * fix.sigma[axis];
-                    let left = fix.value[axis] - p - dt * v;
-                    let share =
-                        (pp + 2.0 * dt * pv + dt * dt * vv) / (variance * self.scale[axis / 2].powi(2));
+                    let (expected, known) = common.expected(dt, state, covariance);
+                    let left = fix.value[axis] - expected;
+                    let share = known / (variance * self.noise.scale[axis / 2].powi(2));
                     squares[axis / 2] += left * left / variance;
                     freedom[axis / 2] += (1.0 - share).max(0.0);
                 }
             }
         }
-        self.scale = [0, 1].map(|i| (squares[i] / freedom[i]).sqrt().max(1e-3));
+        let Noise { scale, common_m2 } = self.noise;
+        self.noise = Noise {
+            scale: [0, 1].map(|i| (squares[i] / freedom[i]).sqrt().max(1e-3)),
+            common_m2: common::next(dive, switches, track, scale, common_m2, self.usual_m2),
+        };
     }
 }

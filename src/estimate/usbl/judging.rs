@@ -1,7 +1,7 @@
 //! A verdict for every fix.
 
 use super::dive::{Dive, height_at};
-use super::switches::Switches;
+use super::switches::{Noise, Switches};
 use super::verdict::{Judged, Reason, Verdict};
 use super::wiener::Wiener;
 use super::{Height, Settings, cycles, in_order};
@@ -78,7 +78,7 @@ impl<'a> Judging<'a> {
         Self { judged, usable, left_out, fixes }
     }
 
-    pub(super) fn judge(&mut self, dive: &Dive, switches: &Switches, track: &Wiener, scale: [f64; 2]) {
+    pub(super) fn judge(&mut self, dive: &Dive, switches: &Switches, track: &Wiener, found: Noise) {
         for (e, exchange) in dive.exchanges.iter().enumerate() {
             for i in exchange.fixes.clone().filter(|&i| !switches.used[i]) {
                 let reason = if switches.believed[e] { Reason::OffByItself } else { Reason::OffAsCycle };
@@ -89,7 +89,9 @@ impl<'a> Judging<'a> {
         // noise is that of the dive's fixes where there is one, which is what was stated times what was found
         let mut noise: Vec<[f64; 3]> = self.fixes.iter().map(|f| f.sigma).collect();
         for (fix, &i) in dive.fixes.iter().zip(&self.usable) {
-            noise[i] = std::array::from_fn(|a| fix.sigma[a] * scale[a / 2]);
+            noise[i] = std::array::from_fn(|a| {
+                (fix.sigma[a] * found.scale[a / 2]).hypot(found.common_m2[a / 2].sqrt())
+            });
         }
         let centres: Vec<f64> = dive.exchanges.iter().map(|e| e.time_s).collect();
         for ((fix, judged), noise) in self.fixes.iter().zip(&mut self.judged).zip(noise) {

@@ -66,6 +66,7 @@ pub mod ship;
 mod another;
 mod candidates;
 mod clean;
+mod common;
 mod dive;
 mod judging;
 mod liveliness;

@@ -1,8 +1,18 @@
 //! The switches, one an exchange and one a fix, each judged by the track without its exchange.
 
 use super::candidates::{WildShares, least_wild_m2, log_normal, log_off, minus, square};
+use super::common::Common;
 use super::dive::Dive;
-use super::wiener::Wiener;
+use super::wiener::{Knowledge, Wiener};
+
+/// What is found of the noise: horizontal, vertical.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Noise {
+    /// Standard deviation of a fix about its exchange, over that of the dive's fixes.
+    pub(super) scale: [f64; 2],
+    /// Variance of what an exchange's fixes have in common, m^2.
+    pub(super) common_m2: [f64; 2],
+}
 
 /// Which exchanges and fixes are believed.
 pub(super) struct Switches {
@@ -21,31 +31,18 @@ struct Without {
 
 impl Without {
     /// `None` where nothing else tells.
-    fn new(
-        dive: &Dive,
-        switches: &Switches,
-        track: &Wiener,
-        scale: [f64; 2],
-        exchange: usize,
-    ) -> Option<Self> {
+    fn new(dive: &Dive, switches: &Switches, track: &Wiener, noise: Noise, exchange: usize) -> Option<Self> {
         let (mut state, mut covariance) = ([[0.0; 2]; 3], [[0.0; 3]; 3]);
-        let own = &dive.exchanges[exchange];
         for axis in 0..3 {
             let ([p, v], [pp, pv, vv]) = track.node(axis, dive.node_of[exchange]);
             let determinant = pp * vv - pv * pv;
             let mut information = [vv / determinant, -pv / determinant, pp / determinant];
             let mut right =
                 [information[0] * p + information[1] * v, information[1] * p + information[2] * v];
-            for i in own.fixes.clone().filter(|&i| switches.used[i]) {
-                let fix = &dive.fixes[i];
-                let dt = fix.time_s - own.time_s;
-                let weight = (fix.sigma[axis] * scale[axis / 2]).powi(-2);
-                for (k, share) in [1.0, dt, dt * dt].into_iter().enumerate() {
-                    information[k] -= weight * share;
-                }
-                right[0] -= weight * fix.value[axis];
-                right[1] -= weight * dt * fix.value[axis];
-            }
+            let own = switches.knowledge(dive, exchange, axis, noise.scale);
+            let own = Common::of(&own, noise.common_m2[axis / 2]).taken_from(own);
+            (0..3).for_each(|k| information[k] -= own.gram[k]);
+            (0..2).for_each(|k| right[k] -= own.right[k]);
             let [a, b, c] = information;
             let determinant = a * c - b * b;
             if !(determinant > 0.0 && a > 0.0) {
@@ -98,6 +95,18 @@ impl Switches {
         heard
     }
 
+    /// What the believed fixes of an exchange say of its node, as if they had nothing in common.
+    pub(super) fn knowledge(&self, dive: &Dive, exchange: usize, axis: usize, scale: [f64; 2]) -> Knowledge {
+        let own = &dive.exchanges[exchange];
+        let mut known = Knowledge::default();
+        for i in own.fixes.clone().filter(|&i| self.used[i]) {
+            let fix = &dive.fixes[i];
+            let weight = (fix.sigma[axis] * scale[axis / 2]).powi(-2);
+            known.add(fix.value[axis], weight, fix.time_s - own.time_s);
+        }
+        known
+    }
+
     /// Shares of what is wild, with a prior worth so many fixes or exchanges.
     pub(super) fn shares(&self, prior: WildShares, worth: f64) -> WildShares {
         let cycles = self.believed.len() as f64;
@@ -111,11 +120,11 @@ impl Switches {
     }
 
     /// Looks at every exchange anew; whether any switch changed.
-    pub(super) fn revise(&mut self, dive: &Dive, track: &Wiener, scale: [f64; 2]) -> bool {
+    pub(super) fn revise(&mut self, dive: &Dive, track: &Wiener, noise: Noise) -> bool {
         let wild = self.wild;
         let mut choices = Vec::new();
         for (e, exchange) in dive.exchanges.iter().enumerate() {
-            let Some(without) = Without::new(dive, self, track, scale, e) else { continue };
+            let Some(without) = Without::new(dive, self, track, noise, e) else { continue };
             let likeliest = &dive.candidates[exchange.candidates.start];
             let (position, variance) = without.at(likeliest.time_s - exchange.time_s);
             let usual = least_wild_m2(likeliest.variance) + variance.iter().sum::<f64>();
@@ -144,23 +153,26 @@ impl Switches {
     }
 
     /// Looks at every fix of a believed exchange anew.
-    pub(super) fn revise_fixes(&mut self, dive: &Dive, track: &Wiener, scale: [f64; 2]) {
+    pub(super) fn revise_fixes(&mut self, dive: &Dive, track: &Wiener, found: Noise) {
         let wild = self.wild;
         for (e, exchange) in dive.exchanges.iter().enumerate() {
             if !self.believed[e] {
                 continue;
             }
+            let common: [Common; 3] = std::array::from_fn(|a| {
+                Common::of(&self.knowledge(dive, e, a, found.scale), found.common_m2[a / 2])
+            });
             for i in exchange.fixes.clone() {
                 let fix = &dive.fixes[i];
                 let dt = fix.time_s - exchange.time_s;
-                let noise: [f64; 3] = std::array::from_fn(|a| (fix.sigma[a] * scale[a / 2]).powi(2));
+                let noise: [f64; 3] = std::array::from_fn(|a| (fix.sigma[a] * found.scale[a / 2]).powi(2));
                 let (mut predicted, mut variance) = ([0.0; 3], [0.0; 3]);
                 for a in 0..3 {
-                    let ([p, v], [pp, pv, vv]) = track.node(a, dive.node_of[e]);
-                    let known = pp + dt * (2.0 * pv + dt * vv);
+                    let (state, covariance) = track.node(a, dive.node_of[e]);
+                    let (expected, known) = common[a].expected(dt, state, covariance);
                     // a used fix has pulled the track towards itself
                     let share = if self.used[i] { (known / noise[a]).min(0.9) } else { 0.0 };
-                    predicted[a] = (fix.value[a] - p - dt * v) / (1.0 - share);
+                    predicted[a] = (fix.value[a] - expected) / (1.0 - share);
                     variance[a] = noise[a] + known / (1.0 - share);
                 }
                 let fits = (1.0 - wild.fix).ln() + log_normal(predicted, variance);

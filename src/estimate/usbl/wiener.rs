@@ -22,12 +22,18 @@ use crate::track::State;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Knowledge {
     /// Sums of w, w dt, w dt^2.
-    gram: [f64; 3],
+    pub(super) gram: [f64; 3],
     /// Sums of w z, w dt z.
-    right: [f64; 2],
+    pub(super) right: [f64; 2],
 }
 
 impl Knowledge {
+    /// Adds what `other` knows.
+    pub(super) fn join(&mut self, other: &Self) {
+        (0..3).for_each(|k| self.gram[k] += other.gram[k]);
+        (0..2).for_each(|k| self.right[k] += other.right[k]);
+    }
+
     /// Adds a position `z` of variance 1/`weight`, `dt_s` after the node.
     pub(super) fn add(&mut self, z: f64, weight: f64, dt_s: f64) {
         self.gram[0] += weight;

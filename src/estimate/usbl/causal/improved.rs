@@ -73,7 +73,8 @@ impl Improved {
     fn close(&mut self, fixes: &[Sample]) {
         let fixes = &fixes[..fixes.len().min(MOST)];
         let groups = std::iter::once(0..fixes.len()).collect::<Vec<_>>();
-        let (found, candidates) = exchanges(fixes, &groups, WILD, 0.3 * self.settings.speed_limit_m_s);
+        let (found, candidates) =
+            exchanges(fixes, &groups, WILD, 0.3 * self.settings.speed_limit_m_s, [0.0; 2]);
         self.exchanges += 1;
         for (beam, lately) in &mut self.beams {
             found.iter().for_each(|exchange| beam.step(exchange, &candidates));
