@@ -11,7 +11,8 @@ const DIVES: std::ops::Range<u64> = 1..25;
 
 #[test]
 fn tracks_and_bands_are_right_seen_and_through_silence() {
-    for (row, [seen_m, silent_m]) in ROWS.iter().zip([[1.5, 13.0], [1.8, 13.0], [1.8, 14.0], [3.0, 20.0]]) {
+    let to_reach = [[1.5, 13.0], [1.8, 13.0], [1.8, 14.0], [3.0, 20.0], [2.6, 15.0]];
+    for (row, [seen_m, silent_m]) in ROWS.iter().zip(to_reach) {
         let judged = smoothed(row, DIVES);
         let [seen, silent] = judged.sums;
         assert!(

@@ -65,6 +65,8 @@ pub struct Dive {
     pub noise_scale: [f64; 2],
     /// Median standard deviation of the kept fixes' noise, m: horizontal, vertical.
     pub noise_m: [f64; 2],
+    /// How much of that all fixes of an exchange have in common, m: horizontal, vertical.
+    pub common_m: [f64; 2],
     /// Time from one exchange to the next, s.
     pub cycle_s: f64,
     /// Root mean square 3-D distance of the prediction from the track: while fixes come, and in silence, m.
@@ -124,6 +126,7 @@ pub fn clean(
         pieces: Vec::new(),
         noise_scale: [1.0; 2],
         noise_m: [f64::NAN; 2],
+        common_m: [0.0; 2],
         cycle_s: 0.0,
         prediction_rmse_m: [None; 2],
         warnings: Vec::new(),
@@ -169,6 +172,7 @@ pub fn clean(
     } else {
         found.noise_scale = found.longest().noise_scale;
     }
+    found.common_m = found.longest().common_m;
     found.noise_m = [0, 2].map(|axis| {
         let kept = positions.iter().zip(&found.judged).filter(|(_, judged)| judged.verdict == Verdict::Kept);
         let mut sigmas: Vec<f64> = kept.map(|(fix, _)| fix.sigma[axis]).collect();
@@ -184,8 +188,8 @@ pub fn clean(
     by_arrival.late.iter().for_each(|&i| found.judged[i].late = true);
     found.warnings.extend(by_arrival.warning(positions.len()));
     found.fixes = positions;
-    for range in &ranges {
-        let points = predict(&found, range.clone(), plan);
+    for (range, piece) in ranges.iter().zip(&found.pieces) {
+        let points = predict(&found, range.clone(), piece.common_m, plan);
         found.prediction.points.extend(points);
     }
     if found.prediction.points.is_empty() {
@@ -312,15 +316,22 @@ impl Arrived {
 }
 
 /// What the causal method says at a piece's instants of the fixes that are neither late nor out at first sight.
-fn predict(found: &Dive, piece: Range<usize>, plan: &DivePlan) -> Vec<TrackPoint> {
+fn predict(found: &Dive, piece: Range<usize>, common_m: [f64; 2], plan: &DivePlan) -> Vec<TrackPoint> {
     let judged = found.fixes[piece.clone()].iter().zip(&found.judged[piece]);
     let seen =
         |judged: &Judged| !judged.late && !matches!(judged.reason, Reason::Repeated | Reason::OffDepth);
-    let fixes: Vec<Sample> = judged.filter(|(_, judged)| seen(judged)).map(|(fix, _)| *fix).collect();
+    // a sigma is of all that a fix is off by: its own noise is what the exchange has not in common
+    let own = |sigma_m: f64, common_m: f64| {
+        (sigma_m * sigma_m - common_m * common_m).max(0.01 * sigma_m * sigma_m).sqrt()
+    };
+    let with_own =
+        |fix: &Sample| Sample { sigma: std::array::from_fn(|a| own(fix.sigma[a], common_m[a / 2])), ..*fix };
+    let fixes: Vec<Sample> =
+        judged.filter(|(_, judged)| seen(judged)).map(|(fix, _)| with_own(fix)).collect();
     let (cycle_s, limit_m_s) = (found.cycle_s, plan.settings.speed_limit_m_s);
     match plan.causal {
         Causal::Improved => {
-            let settings = ImprovedSettings { cycle_s, speed_limit_m_s: limit_m_s };
+            let settings = ImprovedSettings { cycle_s, speed_limit_m_s: limit_m_s, common_m };
             predicted(Improved::new(settings), Method::UsblCausal, &fixes, cycle_s, plan)
         }
         Causal::Paper => {

@@ -100,10 +100,20 @@ pub struct UsblTrackReport {
     pub span_s: (f64, f64),
     /// Median standard deviation of the kept fixes' noise, m: horizontal, vertical.
     pub noise_m: [f64; 2],
-    /// The same over what was stated, and 1 where nothing was.
+    /// How much of it all fixes of an exchange have in common, m: horizontal, vertical.
+    pub common_m: [f64; 2],
+    /// The noise over what was stated, and 1 where nothing was.
     pub noise_scale: [f64; 2],
     /// Density of the vehicle's acceleration, m^2/s^3: horizontal, vertical.
     pub acceleration_density: [f64; 2],
+}
+
+impl UsblTrackReport {
+    /// Whether the fixes of an exchange have so much in common that it matters.
+    #[must_use]
+    pub fn has_common(&self) -> bool {
+        self.common_m.iter().zip(self.noise_m).any(|(common, noise)| *common > 0.4 * noise)
+    }
 }
 
 /// The causal method's prediction.
@@ -195,6 +205,7 @@ impl UsblReport {
                 span_s: (end(track.points.first()), end(track.points.last())),
                 noise_scale: dive.noise_scale,
                 noise_m: dive.noise_m,
+                common_m: dive.common_m,
                 acceleration_density: dive.longest().acceleration_density,
             },
             phases: phases_of(&dive.fusion, std::slice::from_ref(fixes), span),
@@ -276,6 +287,10 @@ fn fixes(out: &mut String, report: &UsblReport) -> fmt::Result {
     let path = source.position.as_deref().map(printable).unwrap_or_default();
     writeln!(out, "fixes   {} of {path}, timed by {}", source.positions, source.clock)?;
     writeln!(out, "        {} kept; {}", fixes.kept, noise(report))?;
+    if report.track.has_common() {
+        let [across, down] = report.track.common_m;
+        writeln!(out, "        of it {across:.2} m and {down:.2} m are common to all fixes of an exchange")?;
+    }
     for (count, why) in [
         (fixes.off_by_itself, "thrown out: each off by itself"),
         (fixes.off_as_cycle, "thrown out with their whole exchange"),

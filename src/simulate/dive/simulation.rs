@@ -98,7 +98,7 @@ pub fn simulate_dive(scenario: &DiveScenario) -> Result<SimulatedDive, SimulateE
 
     let mut heard = scenario.usbl.clone();
     if scenario.messages.fixes_as == FixesAs::Polar {
-        heard = UsblConstants { sigma_m: 0.0, ..heard }; // the noise is then of range and angles
+        heard = UsblConstants { sigma_m: 0.0, common_sigma_m: 0.0, ..heard }; // the noise is then of range and angles
     }
     let mut record = watch_by_usbl(&trajectory, end_s, &heard, &mut rng);
     let silence_s = record.silence_s.map(|silence_s| silence_s.map(|t| t.min(end_s)));

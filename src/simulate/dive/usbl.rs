@@ -24,6 +24,8 @@ pub struct UsblConstants {
     pub spacing_s: f64,
     /// Standard deviation of the noise an axis, m.
     pub sigma_m: f64,
+    /// Standard deviation of what all fixes of an exchange are off by beside that, m.
+    pub common_sigma_m: f64,
     /// Share of fixes that are wild by themselves.
     pub wild_fixes: f64,
     /// Share of exchanges that are wild as a whole: all their fixes off by the same vector.
@@ -46,6 +48,7 @@ impl Default for UsblConstants {
             fixes: [3, 6],
             spacing_s: 0.5,
             sigma_m: 3.0,
+            common_sigma_m: 0.0,
             wild_fixes: 0.0,
             wild_cycles: 0.0,
             wild_m: [15.0, 300.0],
@@ -100,7 +103,11 @@ pub fn watch_by_usbl(
         let late: f64 = StandardNormal.sample(rng);
         let at_s = (f64::from(cycle) + 0.25) * c.cycle_s + c.jitter_s * late.clamp(-3.0, 3.0);
         let lost = rng.random::<f64>() < c.lost_cycles;
-        let common = (rng.random::<f64>() < c.wild_cycles).then(|| offset(c.wild_m, rng));
+        let wild = (rng.random::<f64>() < c.wild_cycles).then(|| offset(c.wild_m, rng));
+        let mut common = Vector3::zeros();
+        if c.common_sigma_m > 0.0 {
+            common = Vector3::from_fn(|_, _| StandardNormal.sample(rng)) * c.common_sigma_m;
+        }
         for k in 0..rng.random_range(c.fixes[0]..=c.fixes[1]) {
             let time_s = at_s + f64::from(k) * c.spacing_s;
             let own = (rng.random::<f64>() < c.wild_fixes).then(|| offset(c.wild_m, rng));
@@ -108,9 +115,10 @@ pub fn watch_by_usbl(
             if lost || !heard(time_s) {
                 continue;
             }
-            let off = common.or(own);
-            let value = trajectory.at(time_s).position + noise + off.unwrap_or_default();
-            let sample = Sample { time_s, value: value.into(), sigma: [c.sigma_m; 3] };
+            let off = wild.or(own);
+            let value = trajectory.at(time_s).position + common + noise + off.unwrap_or_default();
+            let sample =
+                Sample { time_s, value: value.into(), sigma: [c.sigma_m.hypot(c.common_sigma_m); 3] };
             fixes.push(SimulatedFix { sample, wild: off.is_some() });
         }
     }

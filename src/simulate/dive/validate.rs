@@ -61,6 +61,7 @@ fn usbl(table: &Table, c: &UsblConstants, duration_s: f64) -> Result<(), Simulat
         ("jitter_s", c.jitter_s, 0.0, c.cycle_s / 12.0),
         ("spacing_s", c.spacing_s, 0.0, c.cycle_s / (2.0 * most)),
         ("sigma_m", c.sigma_m, 0.0, 1000.0),
+        ("common_sigma_m", c.common_sigma_m, 0.0, 1000.0),
         ("wild_fixes", c.wild_fixes, 0.0, 1.0),
         ("wild_cycles", c.wild_cycles, 0.0, 1.0),
         ("lost_cycles", c.lost_cycles, 0.0, 1.0),

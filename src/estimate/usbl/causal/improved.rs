@@ -19,11 +19,13 @@ pub struct ImprovedSettings {
     pub cycle_s: f64,
     /// The vehicle is rarely faster, m/s.
     pub speed_limit_m_s: f64,
+    /// Standard deviation of what the fixes of one exchange have in common beside their own noise, m: horizontal, vertical.
+    pub common_m: [f64; 2],
 }
 
 impl Default for ImprovedSettings {
     fn default() -> Self {
-        Self { cycle_s: 20.0, speed_limit_m_s: 2.5 }
+        Self { cycle_s: 20.0, speed_limit_m_s: 2.5, common_m: [0.0; 2] }
     }
 }
 
@@ -72,9 +74,10 @@ impl Improved {
 
     fn close(&mut self, fixes: &[Sample]) {
         let fixes = &fixes[..fixes.len().min(MOST)];
+        let common_m2 = self.settings.common_m.map(|c| c * c);
         let groups = std::iter::once(0..fixes.len()).collect::<Vec<_>>();
         let (found, candidates) =
-            exchanges(fixes, &groups, WILD, 0.3 * self.settings.speed_limit_m_s, [0.0; 2]);
+            exchanges(fixes, &groups, WILD, 0.3 * self.settings.speed_limit_m_s, common_m2);
         self.exchanges += 1;
         for (beam, lately) in &mut self.beams {
             found.iter().for_each(|exchange| beam.step(exchange, &candidates));

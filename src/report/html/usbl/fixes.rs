@@ -191,6 +191,10 @@ fn exchanges(parts: Parts<'_>) -> Table {
         row("noise of a kept fix, x and y", noise(across)),
         row("noise of a kept fix, z", noise(down)),
     ];
+    if report.track.has_common() {
+        let [across, down] = report.track.common_m.map(noise);
+        rows.push(row("of it common to an exchange's fixes", format!("{across} in x and y, {down} in z")));
+    }
     if let Some(depth) = &report.depth {
         rows.push(row("depth channel", format!("{} depths of {}", depth.samples, depth.path)));
     }
