@@ -22,10 +22,12 @@ use super::wiener::{Knowledge, Wiener};
 const FEWEST: usize = 20;
 
 /// What all fixes of an exchange are off by, as far as (2) tells.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Common {
     /// u / S.
     gain: [f64; 2],
+    /// c^-2 / S, which is 1 less the first of these.
+    left: f64,
     /// sum(w z) / S.
     mean: f64,
     /// 1 / S.
@@ -36,18 +38,20 @@ impl Common {
     /// That of fixes with these normal equations; `common_m2` is c^2.
     pub(super) fn of(own: &Knowledge, common_m2: f64) -> Self {
         if common_m2 <= 0.0 || own.gram[0] <= 0.0 {
-            return Self::default();
+            return Self { gain: [0.0; 2], left: 1.0, mean: 0.0, variance: 0.0 };
         }
         let s = own.gram[0] + common_m2.recip();
-        Self { gain: [own.gram[0] / s, own.gram[1] / s], mean: own.right[0] / s, variance: s.recip() }
+        let gain = [own.gram[0] / s, own.gram[1] / s];
+        Self { gain, left: common_m2.recip() / s, mean: own.right[0] / s, variance: s.recip() }
     }
 
     /// The normal equations without it.
     pub(super) fn taken_from(&self, own: Knowledge) -> Knowledge {
-        let [a, b] = self.gain;
+        let [_, b] = self.gain;
         let [w, wt, wtt] = own.gram;
         let [wz, wtz] = own.right;
-        Knowledge { gram: [w - a * w, wt - a * wt, wtt - b * wt], right: [wz - a * wz, wtz - b * wz] }
+        let left = self.left;
+        Knowledge { gram: [left * w, left * wt, wtt - b * wt], right: [left * wz, wtz - b * wz] }
     }
 
     /// b and its variance, given the state and its covariance.
@@ -59,7 +63,7 @@ impl Common {
     /// Where a fix `dt_s` after the node is to be expected but for its own noise, p + dt v + b, and the variance.
     pub(super) fn expected(&self, dt_s: f64, state: [f64; 2], covariance: [f64; 3]) -> (f64, f64) {
         let ([p, v], [pp, pv, vv]) = (state, covariance);
-        let (g, h) = (1.0 - self.gain[0], dt_s - self.gain[1]);
+        let (g, h) = (self.left, dt_s - self.gain[1]);
         let variance = self.variance + g * g * pp + 2.0 * g * h * pv + h * h * vv;
         (p + dt_s * v + self.at(state, covariance).0, variance)
     }
@@ -93,8 +97,10 @@ pub(super) fn next(
                 determined += (1.0 - variance / now).clamp(0.0, 1.0);
             }
         }
-        // squared: where little is in common, the plain step takes long to say so
         let factor = squares / determined / now;
-        (now * (factor * factor).clamp(0.05, 20.0)).clamp(1e-6 * usual, 1e6 * usual)
+        // downwards squared: where little is in common, the plain step takes long to say so; upwards held, so that the
+        // motion has its chance to explain what it can
+        let factor = if factor < 1.0 { (factor * factor).max(0.05) } else { factor.min(3.0) };
+        (now * factor).clamp(1e-6 * usual, 1e6 * usual)
     })
 }

@@ -1,3 +1,4 @@
+mod common;
 mod warnings;
 
 use nalgebra::{DMatrix, DVector};
