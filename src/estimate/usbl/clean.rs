@@ -173,17 +173,7 @@ pub fn clean(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Resul
         }
         track = fit.settle(&dive, &switches, 1)?;
     }
-    // a liveliness that changes in time, and fixes one by one
-    for step in 0..LIVELY_STEPS {
-        let densities = liveliness::densities(&track, &dive.nodes_s, &switches.heard(&dive), fit.density);
-        track = fit.track(&dive, &switches, densities)?;
-        if LIVELY_REVISED.contains(&step) {
-            switches.revise(&dive, &track, fit.noise);
-        } else {
-            switches.revise_fixes(&dive, &track, fit.noise);
-        }
-        fit.noisy(&dive, &switches, &track);
-    }
+    track = fit.enliven(&dive, &mut switches, track)?;
     let within = [0, 1].map(|i| scale[i] * fit.noise.scale[i]);
     let common_m = fit.noise.common_m2.map(f64::sqrt);
     // a fix is off by both
@@ -266,6 +256,26 @@ impl Fit {
             self.density = [0, 1].map(|i| self.density[i] * factor[i]);
         }
         Err(EstimateError::Undetermined { what: "usbl".into(), why: "the fit didn't end" })
+    }
+
+    /// A liveliness that changes in time, and fixes one by one.
+    fn enliven(
+        &mut self,
+        dive: &Dive,
+        switches: &mut Switches,
+        mut track: Wiener,
+    ) -> Result<Wiener, EstimateError> {
+        for step in 0..LIVELY_STEPS {
+            let densities = liveliness::densities(&track, &dive.nodes_s, &switches.heard(dive), self.density);
+            track = self.track(dive, switches, densities)?;
+            if LIVELY_REVISED.contains(&step) {
+                switches.revise(dive, &track, self.noise);
+            } else {
+                switches.revise_fixes(dive, &track, self.noise);
+            }
+            self.noisy(dive, switches, &track);
+        }
+        Ok(track)
     }
 
     fn track(
