@@ -190,6 +190,7 @@ pub fn clean(fixes: &[Sample], heights: &[Height], settings: &Settings) -> Resul
         disputes: &second.disputes,
         judging: &judging,
         fit_scale: fit.noise.scale,
+        common_m,
         noise_scale: scale,
         speed_limit_m_s: settings.speed_limit_m_s,
     });

@@ -52,6 +52,8 @@ pub(super) struct Evidence<'a> {
     pub(super) judging: &'a Judging<'a>,
     /// The noise that was found over that of the dive's fixes, and over what was stated.
     pub(super) fit_scale: [f64; 2],
+    /// What the fixes of an exchange have in common.
+    pub(super) common_m: [f64; 2],
     pub(super) noise_scale: [f64; 2],
     pub(super) speed_limit_m_s: f64,
 }
@@ -154,13 +156,15 @@ pub(super) fn merged(mut disputes: Vec<Dispute>) -> Vec<Dispute> {
 }
 
 fn is_worth_telling(dispute: &Dispute, evidence: &Evidence) -> bool {
-    let &Evidence { dive, track, .. } = evidence;
+    let &Evidence { dive, track, common_m: [across, down], .. } = evidence;
     let largest = |sigma: [f64; 3]| sigma.into_iter().fold(0.0, f64::max);
     let fix = &dive.fixes[dive.exchanges[dispute.to].fixes.start];
+    // what an exchange has in common is noise of a fix too
+    let noise_m = largest(fix.sigma).hypot(across.max(down));
     let sigma_at = |e: usize| largest(track.at(dive.exchanges[e].time_s).position_sigma);
     // what costs most comes last
     dispute.log_odds.exp() > RIVAL_ODDS
-        && dispute.apart_m > RIVAL_FIX_SIGMAS * largest(fix.sigma)
+        && dispute.apart_m > RIVAL_FIX_SIGMAS * noise_m
         && (dispute.from..=dispute.to).all(|e| dispute.apart_m > RIVAL_SIGMAS * sigma_at(e))
 }
 
