@@ -1,7 +1,7 @@
 //! The robust smoother, from fixes to a track, a verdict for each, and warnings.
 
 use super::candidates::{Candidate, Exchange, WildShares, exchanges};
-use super::common::{self, Common};
+use super::common;
 use super::dive::Dive;
 use super::judging::{Judging, LeftOut};
 use super::search::{Motion, search};
@@ -291,8 +291,7 @@ impl Fit {
                 continue;
             }
             for axis in 0..3 {
-                let own = switches.knowledge(dive, e, axis, self.noise.scale);
-                let common = Common::of(&own, self.noise.common_m2[axis / 2]);
+                let (own, common) = switches.told(dive, e, axis, self.noise);
                 knowledge[node][axis].join(&common.taken_from(own));
             }
         }
@@ -313,8 +312,7 @@ impl Fit {
             let node = dive.node_of[e];
             for axis in 0..3 {
                 let (state, covariance) = track.node(axis, node);
-                let own = switches.knowledge(dive, e, axis, self.noise.scale);
-                let common = Common::of(&own, self.noise.common_m2[axis / 2]);
+                let (_, common) = switches.told(dive, e, axis, self.noise);
                 for i in exchange.fixes.clone().filter(|&i| switches.used[i]) {
                     let fix = &dive.fixes[i];
                     let dt = fix.time_s - exchange.time_s;
@@ -327,10 +325,9 @@ impl Fit {
                 }
             }
         }
-        let Noise { scale, common_m2 } = self.noise;
         self.noise = Noise {
             scale: [0, 1].map(|i| (squares[i] / freedom[i]).sqrt().max(1e-3)),
-            common_m2: common::next(dive, switches, track, scale, common_m2, self.usual_m2),
+            common_m2: common::next(dive, switches, track, self.noise, self.usual_m2),
         };
     }
 }

@@ -15,7 +15,7 @@
 //! c^2 is found with the rest by restricted likelihood: sum b^2 / sum (1 - var b / c^2), the fixed point of MacKay 1992.
 
 use super::dive::Dive;
-use super::switches::Switches;
+use super::switches::{Noise, Switches};
 use super::wiener::{Knowledge, Wiener};
 
 /// Fewest exchanges with several fixes that tell what they have in common.
@@ -74,8 +74,7 @@ pub(super) fn next(
     dive: &Dive,
     switches: &Switches,
     track: &Wiener,
-    scale: [f64; 2],
-    now_m2: [f64; 2],
+    noise: Noise,
     usual_m2: [f64; 2],
 ) -> [f64; 2] {
     let several = |e: &usize| dive.exchanges[*e].fixes.clone().filter(|&i| switches.used[i]).count() > 1;
@@ -85,14 +84,14 @@ pub(super) fn next(
     }
     [0..2, 2..3].map(|axes| {
         let which = axes.start / 2;
-        let (now, usual) = (now_m2[which], usual_m2[which]);
+        let (now, usual) = (noise.common_m2[which], usual_m2[which]);
         // nothing in common is the likeliest before anything is known
         let (mut squares, mut determined) = (0.01 * usual, 1.0);
         for axis in axes {
             for &e in &several {
-                let own = switches.knowledge(dive, e, axis, scale);
+                let (_, common) = switches.told(dive, e, axis, noise);
                 let (state, covariance) = track.node(axis, dive.node_of[e]);
-                let (b, variance) = Common::of(&own, now).at(state, covariance);
+                let (b, variance) = common.at(state, covariance);
                 squares += b * b;
                 determined += (1.0 - variance / now).clamp(0.0, 1.0);
             }

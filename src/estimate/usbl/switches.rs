@@ -39,8 +39,8 @@ impl Without {
             let mut information = [vv / determinant, -pv / determinant, pp / determinant];
             let mut right =
                 [information[0] * p + information[1] * v, information[1] * p + information[2] * v];
-            let own = switches.knowledge(dive, exchange, axis, noise.scale);
-            let own = Common::of(&own, noise.common_m2[axis / 2]).taken_from(own);
+            let (own, common) = switches.told(dive, exchange, axis, noise);
+            let own = common.taken_from(own);
             (0..3).for_each(|k| information[k] -= own.gram[k]);
             (0..2).for_each(|k| right[k] -= own.right[k]);
             let [a, b, c] = information;
@@ -95,16 +95,23 @@ impl Switches {
         heard
     }
 
-    /// What the believed fixes of an exchange say of its node, as if they had nothing in common.
-    pub(super) fn knowledge(&self, dive: &Dive, exchange: usize, axis: usize, scale: [f64; 2]) -> Knowledge {
+    /// What the believed fixes of an exchange say of its node, as if they had nothing in common, and what they have.
+    pub(super) fn told(
+        &self,
+        dive: &Dive,
+        exchange: usize,
+        axis: usize,
+        noise: Noise,
+    ) -> (Knowledge, Common) {
         let own = &dive.exchanges[exchange];
         let mut known = Knowledge::default();
         for i in own.fixes.clone().filter(|&i| self.used[i]) {
             let fix = &dive.fixes[i];
-            let weight = (fix.sigma[axis] * scale[axis / 2]).powi(-2);
+            let weight = (fix.sigma[axis] * noise.scale[axis / 2]).powi(-2);
             known.add(fix.value[axis], weight, fix.time_s - own.time_s);
         }
-        known
+        let common = Common::of(&known, noise.common_m2[axis / 2]);
+        (known, common)
     }
 
     /// Shares of what is wild, with a prior worth so many fixes or exchanges.
@@ -159,9 +166,7 @@ impl Switches {
             if !self.believed[e] {
                 continue;
             }
-            let common: [Common; 3] = std::array::from_fn(|a| {
-                Common::of(&self.knowledge(dive, e, a, found.scale), found.common_m2[a / 2])
-            });
+            let common: [Common; 3] = std::array::from_fn(|a| self.told(dive, e, a, found).1);
             for i in exchange.fixes.clone() {
                 let fix = &dive.fixes[i];
                 let dt = fix.time_s - exchange.time_s;
